@@ -1,0 +1,27 @@
+//! The wire between daemon and clients: what is said, how it is framed, and both halves of the talk.
+//!
+//! Start at [`Client`]: give it a project's socket and it delivers complete [`Revision`]s, reconnecting as
+//! daemons come and go. The daemon's half is [`Server`]. The bytes are described in `docs/protocol.md`.
+//!
+//! Conventions: a revision is whole or absent; contents are named by SHA-256 and fetched once; every
+//! length read from a peer has a limit.
+//!
+//! Not here: what targets mean, when to build (`kiln-daemon`), pixels (`kiln-preview`).
+
+pub use client::{Client, ClientEvent};
+pub use message::{ClientMessage, FrameReport, PROTOCOL_VERSION, ProgressReport, ServerMessage};
+pub use place::{LockError, ProjectLock, socket_path};
+pub use revision::{ActionTime, Part, Revision, RevisionTable, Target, TargetState, Work};
+pub use server::{BlobSource, Server, ServerEvent};
+pub use wire::{Decoder, WireError};
+
+mod client;
+mod message;
+mod place;
+mod revision;
+mod server;
+mod session;
+#[cfg(test)]
+mod tests;
+mod transport;
+mod wire;

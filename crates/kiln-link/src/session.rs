@@ -1,0 +1,123 @@
+//! A client's half of the talk as a state machine without sockets or threads.
+
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
+
+use kiln_build::Digest;
+
+use crate::{ClientEvent, ClientMessage, PROTOCOL_VERSION, Revision, RevisionTable, ServerMessage};
+
+/// Turns what the daemon says into requests and whole revisions. Contents survive a reconnection, so that a
+/// client that has everything fetches nothing.
+#[derive(Default)]
+pub(crate) struct ClientSession {
+    greeted: bool,
+    contents: HashMap<Digest, Arc<[u8]>>,
+    arriving: HashMap<Digest, Vec<u8>>,
+    requested: HashSet<Digest>,
+    pending: Option<RevisionTable>,
+}
+
+/// What to do after a message.
+#[derive(Default)]
+pub(crate) struct Reaction {
+    pub(crate) send: Vec<ClientMessage>,
+    pub(crate) events: Vec<ClientEvent>,
+}
+
+impl ClientSession {
+    /// Begins a new connection: what was asked of the old one will not come.
+    pub(crate) fn reset(&mut self) {
+        self.greeted = false;
+        self.arriving.clear();
+        self.requested.clear();
+        self.pending = None;
+    }
+
+    /// Takes one message.
+    ///
+    /// # Errors
+    /// The daemon broke the protocol; the text says how, and the connection must end.
+    pub(crate) fn receive(&mut self, message: ServerMessage) -> Result<Reaction, String> {
+        let mut reaction = Reaction::default();
+        match message {
+            ServerMessage::Hello { protocol, project } => {
+                if protocol != PROTOCOL_VERSION {
+                    return Err(format!(
+                        "the daemon speaks protocol {protocol}, this client {PROTOCOL_VERSION}: update the older one"
+                    ));
+                }
+                self.greeted = true;
+                reaction.events.push(ClientEvent::Connected { project });
+            }
+            _ if !self.greeted => return Err("the daemon did not begin with a greeting".to_owned()),
+            ServerMessage::Revision(table) => {
+                self.pending = Some(table);
+                self.request_missing(&mut reaction);
+                self.commit_if_whole(&mut reaction);
+            }
+            ServerMessage::Chunk { digest, offset, total, bytes } => {
+                self.take_chunk(digest, offset, total, &bytes)?;
+                self.commit_if_whole(&mut reaction);
+            }
+            // A newer revision follows; the pending one can no longer become whole.
+            ServerMessage::Missing(digest) => {
+                self.requested.remove(&digest);
+                self.pending = None;
+            }
+            ServerMessage::Progress(progress) => reaction.events.push(ClientEvent::Progress {
+                done: progress.done,
+                total: progress.total,
+                current: progress.current,
+            }),
+        }
+        Ok(reaction)
+    }
+
+    fn request_missing(&mut self, reaction: &mut Reaction) {
+        let Some(table) = &self.pending else { return };
+        let parts = table.targets.values().flat_map(|target| &target.parts);
+        let missing: Vec<Digest> = parts
+            .map(|part| part.digest)
+            .filter(|digest| !self.contents.contains_key(digest) && self.requested.insert(*digest))
+            .collect();
+        if !missing.is_empty() {
+            reaction.send.push(ClientMessage::Fetch(missing));
+        }
+    }
+
+    fn take_chunk(&mut self, digest: Digest, offset: u64, total: u64, bytes: &[u8]) -> Result<(), String> {
+        if !self.requested.contains(&digest) {
+            return Err(format!("the daemon sent content {} without being asked", digest.short()));
+        }
+        let content = self.arriving.entry(digest).or_default();
+        if content.len() as u64 != offset {
+            return Err(format!("a chunk of {} begins at {offset} instead of {}", digest.short(), content.len()));
+        }
+        content.extend_from_slice(bytes);
+        if (content.len() as u64) < total {
+            return Ok(());
+        }
+        let content = self.arriving.remove(&digest).unwrap_or_default();
+        self.requested.remove(&digest);
+        if Digest::of(&content) != digest {
+            return Err(format!("content {} arrived with other bytes", digest.short()));
+        }
+        self.contents.insert(digest, content.into());
+        Ok(())
+    }
+
+    fn commit_if_whole(&mut self, reaction: &mut Reaction) {
+        let Some(table) = &self.pending else { return };
+        let parts = table.targets.values().flat_map(|target| &target.parts);
+        let wanted: HashSet<Digest> = parts.map(|part| part.digest).collect();
+        if !wanted.iter().all(|digest| self.contents.contains_key(digest)) {
+            return;
+        }
+        self.contents.retain(|digest, _| wanted.contains(digest));
+        let Some(table) = self.pending.take() else { return };
+        if let Ok(revision) = Revision::new(table, self.contents.clone()) {
+            reaction.events.push(ClientEvent::Revision(Arc::new(revision)));
+        }
+    }
+}
