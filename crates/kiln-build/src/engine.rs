@@ -10,7 +10,7 @@ use serde_json::Value;
 use crate::digest::FieldHasher;
 use crate::sources::lock;
 use crate::store::write_json;
-use crate::{Digest, Error, ProjectState, SourceState, SourceTree, Store};
+use crate::{Digest, Error, ProjectState, SourceState, SourceTree, Store, Targets};
 
 /// How many earlier results of a scan are kept, so that a reverted edit finds its old one.
 const SCAN_RESULTS_KEPT: usize = 8;
@@ -81,13 +81,13 @@ impl Engine {
         &self.folder
     }
 
-    /// What the owner of the graph kept between runs.
-    pub fn kept_targets(&self) -> Value {
+    /// What was published last.
+    pub fn last_targets(&self) -> Targets {
         lock(&self.state).targets.clone()
     }
 
-    /// Keeps the owner's targets and the engine's own memory for the next process.
-    pub fn save(&self, targets: Value) -> Result<(), Error> {
+    /// Keeps what is published now, and the engine's own memory, for the next process.
+    pub fn save(&self, targets: Targets) -> Result<(), Error> {
         let mut state = lock(&self.state);
         let stamps = self.sources.stamps();
         if state.targets == targets && state.stamps == stamps && !state.dirty {

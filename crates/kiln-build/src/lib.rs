@@ -19,6 +19,7 @@ pub use record::{ActionRecord, InputRecord, OutputRecord};
 pub use run::{Outcome, Progress, RunOptions, RunReport, Status};
 pub use sources::{SourceState, SourceTree};
 pub use store::{Error, Store, write_atomically};
+pub use target::{Part, Target, TargetState, Targets};
 
 mod action;
 mod digest;
@@ -29,5 +30,6 @@ mod record;
 mod run;
 mod sources;
 mod store;
+mod target;
 #[cfg(test)]
 mod tests;

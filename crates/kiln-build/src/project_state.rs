@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::sources::Stamp;
-use crate::{Digest, Error, Store, store};
+use crate::{Digest, Error, Store, Targets, store};
 
 /// Memory of one project (one folder).
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -14,8 +14,8 @@ pub struct ProjectState {
     pub(crate) stamps: BTreeMap<String, Stamp>,
     /// Action name to the key with which it last succeeded or failed: the "before" of explanations.
     pub actions: BTreeMap<String, Digest>,
-    /// Whatever the owner of the graph wants to keep: the last good targets.
-    pub targets: serde_json::Value,
+    /// What was published last: the last good content of every target.
+    pub targets: Targets,
     /// Whether `actions` changed since it was saved.
     #[serde(skip)]
     pub(crate) dirty: bool,

@@ -96,6 +96,12 @@ impl SourceTree {
         lock(&self.seen).keys().cloned().collect()
     }
 
+    /// Paths that are no longer as they were when they were looked at.
+    pub fn changed_since_seen(&self) -> Vec<String> {
+        let seen = lock(&self.seen).clone();
+        seen.into_iter().filter(|(path, state)| self.examine(path) != *state).map(|(path, _)| path).collect()
+    }
+
     pub(crate) fn stamps(&self) -> BTreeMap<String, Stamp> {
         lock(&self.stamps).clone()
     }

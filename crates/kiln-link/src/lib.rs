@@ -11,7 +11,8 @@
 pub use client::{Client, ClientEvent};
 pub use message::{ClientMessage, FrameReport, PROTOCOL_VERSION, ProgressReport, ServerMessage};
 pub use place::{LockError, ProjectLock, socket_path};
-pub use revision::{ActionTime, Part, Revision, RevisionTable, Target, TargetState, Work};
+pub use kiln_build::{Digest, Part, Target, TargetState, Targets};
+pub use revision::{ActionTime, Revision, RevisionTable, Work};
 pub use server::{BlobSource, Server, ServerEvent};
 pub use wire::{Decoder, WireError};
 

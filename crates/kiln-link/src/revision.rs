@@ -1,9 +1,9 @@
 //! The published state of a project, as both sides of the wire see it.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::sync::Arc;
 
-use kiln_build::Digest;
+use kiln_build::{Digest, Part, Target, Targets};
 use kiln_diagnostic::Diagnostic;
 use serde::{Deserialize, Serialize};
 
@@ -13,45 +13,11 @@ pub struct RevisionTable {
     /// Counts up from 1 while a daemon lives.
     pub number: u64,
     /// Target name to what it is.
-    pub targets: BTreeMap<String, Target>,
+    pub targets: Targets,
     /// What is wrong with the project now.
     pub diagnostics: Vec<Diagnostic>,
     /// What was done to make this revision from the one before.
     pub work: Work,
-}
-
-/// A target's kind, state and contents.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Target {
-    /// `cube`, `lut`, `sh`, `scene`, `shader` or `project`.
-    pub kind: String,
-    /// Whether it matches its sources.
-    pub state: TargetState,
-    /// What a reader of the parts must know: sizes, formats, scales.
-    pub meta: serde_json::Value,
-    /// Contents in a fixed order (the levels of a cube, the text and reflection of a shader).
-    pub parts: Vec<Part>,
-}
-
-/// Whether a target matches its sources.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum TargetState {
-    /// Made from the sources as they are.
-    Fresh,
-    /// Its sources have an error; this is the last good content.
-    Stale,
-}
-
-/// One blob of a target.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Part {
-    /// As `mip3` or `wgsl`.
-    pub name: String,
-    /// SHA-256 of its bytes.
-    pub digest: Digest,
-    /// Its length.
-    pub bytes: u64,
 }
 
 /// What a build did, for people and for the preview's timeline.
@@ -67,8 +33,10 @@ pub struct Work {
     pub plan_ms: f64,
     /// From the plan to the last action's end, milliseconds.
     pub run_ms: f64,
-    /// Unix time of the oldest save in the batch, in milliseconds; 0 for the first build.
-    pub saved_unix_ms: f64,
+    /// Unix time at which the first change of the batch was noticed, in milliseconds; 0 for the first build.
+    pub noticed_unix_ms: f64,
+    /// Unix time at which the revision was published, in milliseconds.
+    pub published_unix_ms: f64,
 }
 
 /// One action and its cost.

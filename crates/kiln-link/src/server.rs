@@ -8,7 +8,6 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::Sender;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -91,7 +90,7 @@ impl Server {
         socket: &Path,
         project: &str,
         blobs: Box<BlobSource>,
-        events: Sender<ServerEvent>,
+        events: Box<dyn Fn(ServerEvent) + Send + Sync>,
     ) -> std::io::Result<Server> {
         match fs::remove_file(socket) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
@@ -102,8 +101,7 @@ impl Server {
         let shared = Arc::new(Shared {
             project: project.to_owned(),
             blobs,
-            // A daemon that no longer listens to its events is about to end.
-            events: Box::new(move |event| drop(events.send(event))),
+            events,
             clients: Mutex::default(),
             latest: Mutex::default(),
             stopping: AtomicBool::new(false),

@@ -44,7 +44,8 @@ fn serve(contents: &[&[u8]]) -> Bench {
         contents.iter().map(|bytes| (Digest::of(bytes), Arc::from(*bytes))).collect();
     let (sender, events) = channel();
     let blobs = Box::new(move |digest: &Digest| blobs.get(digest).cloned());
-    let server = Server::bind(&socket, "test", blobs, sender).unwrap();
+    let events_out = Box::new(move |event| drop(sender.send(event)));
+    let server = Server::bind(&socket, "test", blobs, events_out).unwrap();
     Bench { server, events, socket, _folder: folder }
 }
 
@@ -84,8 +85,8 @@ fn client_reconnects_to_the_next_daemon_on_the_same_socket() {
     drop(bench.server);
     let gone = client.events().recv_timeout(LIMIT).unwrap();
     assert!(matches!(gone, ClientEvent::Disconnected { .. }), "{gone:?}");
-    let (sender, _events) = channel();
-    let server = Server::bind(&bench.socket, "test", Box::new(|_| Some(Arc::from(*b"x"))), sender).unwrap();
+    let server =
+        Server::bind(&bench.socket, "test", Box::new(|_| Some(Arc::from(*b"x"))), Box::new(drop)).unwrap();
     server.publish(Arc::new(table(5, &[b"x"])));
     loop {
         match client.events().recv_timeout(LIMIT).unwrap() {

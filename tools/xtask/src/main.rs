@@ -1,1 +1,54 @@
-fn main() {}
+//! Automation: `cargo xtask help`.
+//!
+//! Start at [`main`]. Everything here runs other programs (cargo, the built `kiln`, apt-get) and uses the standard
+//! library alone, so that it builds in a second.
+//!
+//! Conventions: a step that fails ends the program with its message and exit code 1; what was skipped is said.
+//!
+//! Not here: anything a user of Kiln needs.
+
+#![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command-line tool")]
+
+use std::process::ExitCode;
+
+mod bench;
+mod corpus;
+mod packages;
+mod shell;
+mod test;
+
+const HELP: &str = "\
+cargo xtask test [--no-install]   install what tests need where that is allowed, then run all tests, clippy, fmt and docs
+cargo xtask bench [EDITS]         save-to-frame of shader and HDR edits, no-op bake, bake of one panorama
+cargo xtask corpus [OUT]          bake and render the files of $KILN_CORPUS into OUT (default target/corpus)
+cargo xtask size                  build with and without the preview and compare time and size
+";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let result = match arguments.as_slice() {
+        ["test"] => test::run(true),
+        ["test", "--no-install"] => test::run(false),
+        ["bench"] => bench::run(20),
+        ["bench", edits] => match edits.parse() {
+            Ok(edits) => bench::run(edits),
+            Err(_) => Err(format!("`{edits}` is no number of edits")),
+        },
+        ["corpus"] => corpus::run("target/corpus"),
+        ["corpus", out] => corpus::run(out),
+        ["size"] => bench::size(),
+        ["help" | "--help" | "-h"] | [] => {
+            print!("{HELP}");
+            Ok(())
+        }
+        other => Err(format!("unknown command `{}`\n\n{HELP}", other.join(" "))),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("xtask: {message}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! The thread that builds: one batch at a time, cancelled by the next.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+
+use kiln_build::{Engine, Error, RunOptions, Status, Targets};
+use kiln_link::{ActionTime, ProgressReport, RevisionTable, Server, Work};
+use kiln_project::{Built, build, write_outputs};
+
+use crate::watch::Batch;
+
+/// A finished build, as the loop sees it.
+pub(crate) enum BuildResult {
+    /// It is done; the table's number is still to be given.
+    Done(Box<RevisionTable>),
+    /// A newer edit came in between; these are the edits that the build was for.
+    Cancelled(Batch),
+    /// The tool could not do its work; what was published stays.
+    Failed(Error),
+    /// The build is done and published, but its files could not be written.
+    OutputsFailed(Error),
+}
+
+pub(crate) struct Builder {
+    requests: Sender<Batch>,
+    cancel: Arc<AtomicBool>,
+}
+
+pub(crate) struct BuilderOptions {
+    pub(crate) jobs: usize,
+    pub(crate) write_outputs: bool,
+}
+
+impl Builder {
+    /// Starts the thread; it ends when the builder is dropped.
+    pub(crate) fn start(
+        engine: Arc<Engine>,
+        server: Arc<Server>,
+        options: BuilderOptions,
+        built: impl Fn(BuildResult) + Send + 'static,
+    ) -> Builder {
+        let (requests, received) = channel();
+        let cancel = Arc::new(AtomicBool::new(false));
+        let work = BuilderThread { engine, server, options, cancel: cancel.clone() };
+        std::thread::spawn(move || work.run(&received, &built));
+        Builder { requests, cancel }
+    }
+
+    pub(crate) fn request(&self, batch: Batch) {
+        self.cancel.store(false, Ordering::SeqCst);
+        // The thread lives as long as the builder does.
+        let _ = self.requests.send(batch);
+    }
+
+    pub(crate) fn cancel(&self) {
+        self.cancel.store(true, Ordering::SeqCst);
+    }
+}
+
+struct BuilderThread {
+    engine: Arc<Engine>,
+    server: Arc<Server>,
+    options: BuilderOptions,
+    cancel: Arc<AtomicBool>,
+}
+
+impl BuilderThread {
+    fn run(&self, requests: &Receiver<Batch>, built: &impl Fn(BuildResult)) {
+        let mut last = self.engine.last_targets();
+        while let Ok(batch) = requests.recv() {
+            match self.build(&last) {
+                Ok(None) => built(BuildResult::Cancelled(batch)),
+                Ok(Some(done)) => {
+                    last = done.targets.clone();
+                    let output_dir = self.output_dir(&done);
+                    built(BuildResult::Done(Box::new(to_table(done, batch))));
+                    // Clients first; the files for engines can follow.
+                    if self.options.write_outputs
+                        && let Err(error) = write_outputs(self.engine.store(), &last, &output_dir)
+                    {
+                        built(BuildResult::OutputsFailed(error));
+                    }
+                }
+                Err(error) => built(BuildResult::Failed(error)),
+            }
+        }
+    }
+
+    fn output_dir(&self, built: &Built) -> PathBuf {
+        self.engine.folder().join(&built.plan.project.output_dir)
+    }
+
+    fn build(&self, last: &Targets) -> Result<Option<Built>, Error> {
+        let report = |done, total, current: &str| {
+            self.server.report_progress(&ProgressReport { done, total, current: current.to_owned() });
+        };
+        let progress = |progress: kiln_build::Progress| match progress {
+            kiln_build::Progress::Started { name, .. } => report(0, 0, name),
+            kiln_build::Progress::Settled { done, total } if done == total => report(done, total, ""),
+            kiln_build::Progress::Settled { .. } => {}
+        };
+        let options = RunOptions { jobs: self.options.jobs, cancel: &self.cancel, progress: &progress };
+        match build(&self.engine, last, &options) {
+            // A source that changed while it was read, or a damaged blob: the second look sees it as it is.
+            Err(_) if !self.cancel.load(Ordering::SeqCst) => build(&self.engine, last, &options),
+            result => result,
+        }
+    }
+}
+
+fn to_table(built: Built, batch: Batch) -> RevisionTable {
+    let mut work = to_work(&built);
+    work.changed_files = batch.files.into_iter().collect();
+    work.noticed_unix_ms = batch.noticed_unix_ms;
+    RevisionTable { number: 0, targets: built.targets, diagnostics: built.diagnostics, work }
+}
+
+/// What a build did, as it is published; without the edits that began it, which the build does not know.
+pub fn to_work(built: &Built) -> Work {
+    let outcomes = &built.report.outcomes;
+    let time = |name: &String| {
+        let outcome =
+            outcomes.iter().find(|outcome| outcome.record.as_ref().is_some_and(|record| record.name == *name))?;
+        let (Some(record), Status::Ran { reason }) = (&outcome.record, &outcome.status) else { return None };
+        Some(ActionTime { name: name.clone(), wall_ms: record.wall_ms, reason: reason.clone() })
+    };
+    Work {
+        ran: built.report.ended.iter().filter_map(time).collect(),
+        reused: outcomes.iter().filter(|outcome| outcome.status == Status::Reused).count(),
+        plan_ms: built.plan_ms,
+        run_ms: built.run_ms,
+        ..Work::default()
+    }
+}

@@ -1,0 +1,224 @@
+//! The loop.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::SystemTime;
+
+use kiln_build::{Engine, Error};
+use kiln_link::{LockError, ProjectLock, RevisionTable, Server, ServerEvent, socket_path};
+
+use crate::builder::{BuildResult, Builder, BuilderOptions};
+use crate::watch::{Batch, Watch, send_batches, unix_ms};
+
+/// How to serve a project.
+#[derive(Clone, Debug)]
+pub struct DaemonOptions {
+    /// The project's folder.
+    pub folder: PathBuf,
+    /// Where the store is.
+    pub cache: PathBuf,
+    /// Worker threads.
+    pub jobs: usize,
+    /// Whether baked files are written after each build.
+    pub write_outputs: bool,
+}
+
+/// Why a daemon could not start.
+#[derive(Debug, thiserror::Error)]
+pub enum DaemonError {
+    /// The store or the project's folder cannot be used.
+    #[error(transparent)]
+    Build(#[from] Error),
+    /// The project has a daemon already.
+    #[error(transparent)]
+    Lock(#[from] LockError),
+    /// The socket cannot be made.
+    #[error("cannot listen on {}: {source}", socket.display())]
+    Socket {
+        /// Where it should be.
+        socket: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The folder cannot be watched.
+    #[error("cannot watch the project's folder: {0}")]
+    Watch(#[from] notify::Error),
+}
+
+/// What a daemon tells its owner.
+#[derive(Clone, Debug)]
+pub enum Notice {
+    /// A batch of edits was noticed and a build begins.
+    Building {
+        /// Files that changed; empty for the first build.
+        files: Vec<String>,
+    },
+    /// A build is done and nothing that clients see has changed.
+    Unchanged {
+        /// Files that changed.
+        files: Vec<String>,
+    },
+    /// A new revision is out.
+    Published(Arc<RevisionTable>),
+    /// The tool could not do its work; what was published stays.
+    Failed(String),
+    /// A client did something.
+    Client(ServerEvent),
+}
+
+/// Everything that can happen to a daemon.
+enum Event {
+    Files(Batch),
+    Built(BuildResult),
+    Client(ServerEvent),
+    Stop,
+}
+
+/// Ends a daemon from anywhere.
+#[derive(Clone)]
+pub struct StopHandle(Sender<Event>);
+
+impl StopHandle {
+    /// Asks the daemon to end after the event it handles now.
+    pub fn stop(&self) {
+        // Fails only when it has ended already.
+        let _ = self.0.send(Event::Stop);
+    }
+}
+
+/// A project being served.
+pub struct Daemon {
+    events: Receiver<Event>,
+    stop: StopHandle,
+    engine: Arc<Engine>,
+    server: Arc<Server>,
+    builder: Builder,
+    watch: Watch,
+    socket: PathBuf,
+    published: Option<Arc<RevisionTable>>,
+    /// Edits that the build in flight has not seen; `None` while no build is in flight.
+    building: Option<Batch>,
+    _lock: ProjectLock,
+}
+
+impl Daemon {
+    /// Locks the project, begins to watch and to listen, and starts the first build.
+    pub fn start(options: &DaemonOptions) -> Result<Daemon, DaemonError> {
+        let engine = Arc::new(Engine::open(&options.folder, &options.cache)?);
+        let folder = engine.folder().to_owned();
+        let at = |socket: PathBuf| move |source| DaemonError::Socket { socket, source };
+        let socket = socket_path(&folder).map_err(at(folder.clone()))?;
+        let lock = ProjectLock::take(&socket)?;
+        let (sender, events) = channel();
+        let name = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        let blobs = engine.clone();
+        let blobs = Box::new(move |digest: &_| blobs.store().get(digest).ok().flatten());
+        let server = Server::bind(&socket, &name, blobs, client_events(sender.clone())).map_err(at(socket.clone()))?;
+        let server = Arc::new(server);
+        let mut watch = Watch::start(&folder, send_batches(sender.clone(), Event::Files))?;
+        watch.set_relevant(&[kiln_project::PROJECT_FILE.to_owned()]);
+        let built = sender.clone();
+        let builder_options = BuilderOptions { jobs: options.jobs, write_outputs: options.write_outputs };
+        let builder = Builder::start(engine.clone(), server.clone(), builder_options, move |result| {
+            // Fails only when the daemon has ended.
+            let _ = built.send(Event::Built(result));
+        });
+        let mut daemon = Daemon {
+            events,
+            stop: StopHandle(sender),
+            engine,
+            server,
+            builder,
+            watch,
+            socket,
+            published: None,
+            building: None,
+            _lock: lock,
+        };
+        daemon.begin_build(Batch::default());
+        Ok(daemon)
+    }
+
+    /// Ends this daemon from another thread.
+    pub fn stop_handle(&self) -> StopHandle {
+        self.stop.clone()
+    }
+
+    /// Where clients connect.
+    pub fn socket(&self) -> &std::path::Path {
+        &self.socket
+    }
+
+    /// Serves until stopped.
+    pub fn run(mut self, notify: &mut dyn FnMut(Notice)) {
+        notify(Notice::Building { files: Vec::new() });
+        while let Ok(event) = self.events.recv() {
+            match event {
+                Event::Stop => return self.builder.cancel(),
+                Event::Client(event) => notify(Notice::Client(event)),
+                Event::Files(batch) => match &mut self.building {
+                    Some(unseen) => {
+                        unseen.merge(batch);
+                        self.builder.cancel();
+                    }
+                    None => {
+                        notify(Notice::Building { files: batch.files.iter().cloned().collect() });
+                        self.begin_build(batch);
+                    }
+                },
+                Event::Built(result) => self.end_build(result, notify),
+            }
+        }
+    }
+
+    fn begin_build(&mut self, batch: Batch) {
+        self.building = Some(Batch::default());
+        self.builder.request(batch);
+    }
+
+    fn end_build(&mut self, result: BuildResult, notify: &mut dyn FnMut(Notice)) {
+        let mut unseen = match &result {
+            // The next build may be running already.
+            BuildResult::OutputsFailed(error) => return notify(Notice::Failed(error.to_string())),
+            BuildResult::Cancelled(batch) => batch.clone(),
+            BuildResult::Done(_) | BuildResult::Failed(_) => Batch::default(),
+        };
+        unseen.merge(self.building.take().unwrap_or_default());
+        match result {
+            BuildResult::Done(table) => self.publish(*table, notify),
+            BuildResult::Failed(error) => notify(Notice::Failed(error.to_string())),
+            BuildResult::Cancelled(_) | BuildResult::OutputsFailed(_) => {}
+        }
+        // Sources that became relevant with this build may have changed before they were watched.
+        let sources = self.engine.sources();
+        self.watch.set_relevant(&sources.looked_at());
+        unseen.merge(Batch::now(sources.changed_since_seen()));
+        if !unseen.files.is_empty() {
+            notify(Notice::Building { files: unseen.files.iter().cloned().collect() });
+            self.begin_build(unseen);
+        }
+    }
+
+    fn publish(&mut self, mut table: RevisionTable, notify: &mut dyn FnMut(Notice)) {
+        if let Some(last) = &self.published
+            && last.targets == table.targets
+            && last.diagnostics == table.diagnostics
+        {
+            return notify(Notice::Unchanged { files: table.work.changed_files });
+        }
+        table.number = self.published.as_ref().map_or(1, |last| last.number + 1);
+        table.work.published_unix_ms = unix_ms(SystemTime::now());
+        let table = Arc::new(table);
+        self.server.publish(table.clone());
+        self.published = Some(table.clone());
+        notify(Notice::Published(table));
+    }
+}
+
+fn client_events(sender: Sender<Event>) -> Box<dyn Fn(ServerEvent) + Send + Sync> {
+    Box::new(move |event| {
+        // Fails only when the daemon has ended.
+        let _ = sender.send(Event::Client(event));
+    })
+}

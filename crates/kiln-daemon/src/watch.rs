@@ -1,0 +1,166 @@
+//! File events in, settled batches of changed paths out.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use notify::{EventKind, RecommendedWatcher, RecursiveMode, Watcher as _};
+
+/// A batch ends when nothing has happened for this long …
+const QUIET: Duration = Duration::from_millis(15);
+/// … or when it has gone on for this long.
+const BATCH_MAX: Duration = Duration::from_millis(500);
+
+/// Files of the project that changed together.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Batch {
+    /// Relative to the project where they lie in it.
+    pub(crate) files: BTreeSet<String>,
+    /// Unix time at which the first of them was noticed, in milliseconds.
+    pub(crate) noticed_unix_ms: f64,
+}
+
+impl Batch {
+    /// Files that are found changed at this moment.
+    pub(crate) fn now(files: Vec<String>) -> Batch {
+        Batch { files: files.into_iter().collect(), noticed_unix_ms: unix_ms(SystemTime::now()) }
+    }
+
+    pub(crate) fn merge(&mut self, other: Batch) {
+        self.noticed_unix_ms = match (self.files.is_empty(), other.files.is_empty()) {
+            (true, _) => other.noticed_unix_ms,
+            (false, true) => self.noticed_unix_ms,
+            (false, false) => self.noticed_unix_ms.min(other.noticed_unix_ms),
+        };
+        self.files.extend(other.files);
+    }
+}
+
+/// Watches a project's folder, and the folders of sources that lie elsewhere.
+pub(crate) struct Watch {
+    watcher: RecommendedWatcher,
+    folder: PathBuf,
+    /// What the last plan looked at: canonical path to its name in the project.
+    relevant: Arc<Mutex<BTreeMap<PathBuf, String>>>,
+    outside: BTreeSet<PathBuf>,
+}
+
+impl Watch {
+    /// Begins to watch; `settled` is called from a thread of its own.
+    pub(crate) fn start(folder: &Path, settled: impl Fn(Batch) + Send + 'static) -> notify::Result<Watch> {
+        let (sender, events) = channel();
+        let mut watcher = notify::recommended_watcher(move |event| {
+            // Fails only when the settling thread, and with it the daemon, has ended.
+            let _ = sender.send(event);
+        })?;
+        watcher.watch(folder, RecursiveMode::Recursive)?;
+        let relevant = Arc::new(Mutex::new(BTreeMap::new()));
+        let (folder_of_thread, relevant_of_thread) = (folder.to_owned(), relevant.clone());
+        std::thread::spawn(move || {
+            settle(&events, &settled, |event| name_changes(event, &folder_of_thread, &relevant_of_thread));
+        });
+        Ok(Watch { watcher, folder: folder.to_owned(), relevant, outside: BTreeSet::new() })
+    }
+
+    /// Says which sources matter (project-relative, missing ones too). Those that lie outside the folder, or are
+    /// links to files outside, are watched where they are.
+    pub(crate) fn set_relevant(&mut self, names: &[String]) {
+        let mut relevant = BTreeMap::new();
+        let mut outside = BTreeSet::new();
+        for name in names {
+            let path = normalise(&self.folder.join(name));
+            let target = path.canonicalize().unwrap_or_else(|_| path.clone());
+            for path in [path, target] {
+                if !path.starts_with(&self.folder)
+                    && let Some(parent) = path.parent()
+                {
+                    outside.insert(parent.to_owned());
+                }
+                relevant.insert(path, name.clone());
+            }
+        }
+        *self.relevant.lock().unwrap_or_else(PoisonError::into_inner) = relevant;
+        for folder in outside.difference(&self.outside) {
+            // A folder that does not exist yet cannot be watched; the next plan tries again.
+            let _ = self.watcher.watch(folder, RecursiveMode::NonRecursive);
+        }
+        self.outside.retain(|folder| outside.contains(folder));
+        self.outside.extend(outside.into_iter().filter(|folder| folder.is_dir()));
+    }
+}
+
+/// Removes `.` and `..` without asking the file system, so that missing files have one spelling too.
+fn normalise(path: &Path) -> PathBuf {
+    let mut normal = PathBuf::new();
+    for part in path.components() {
+        match part {
+            std::path::Component::ParentDir => _ = normal.pop(),
+            std::path::Component::CurDir => {}
+            other => normal.push(other),
+        }
+    }
+    normal
+}
+
+/// The sources that an event is about: itself, or those below a folder that appeared, went or moved.
+/// An error (a queue overflow) is about all of them.
+fn name_changes(
+    event: &notify::Result<notify::Event>,
+    folder: &Path,
+    relevant: &Mutex<BTreeMap<PathBuf, String>>,
+) -> BTreeSet<String> {
+    let relevant = relevant.lock().unwrap_or_else(PoisonError::into_inner);
+    let Ok(event) = event else { return relevant.values().cloned().collect() };
+    if event.need_rescan() {
+        return relevant.values().cloned().collect();
+    }
+    if matches!(event.kind, EventKind::Access(_)) {
+        return BTreeSet::new();
+    }
+    let mut names = BTreeSet::new();
+    for path in &event.paths {
+        // Being told about the watched folder itself says nothing about a source in it.
+        if path == folder {
+            continue;
+        }
+        let below = relevant.range(path.clone()..).take_while(|(source, _)| source.starts_with(path));
+        names.extend(below.map(|(_, name)| name.clone()));
+    }
+    names
+}
+
+/// Collects events into batches until the sending side is gone.
+fn settle<E>(events: &Receiver<E>, settled: &impl Fn(Batch), name: impl Fn(&E) -> BTreeSet<String>) {
+    while let Ok(event) = events.recv() {
+        let mut files = name(&event);
+        if files.is_empty() {
+            continue;
+        }
+        let noticed_unix_ms = unix_ms(SystemTime::now());
+        let begun = Instant::now();
+        while begun.elapsed() < BATCH_MAX {
+            match events.recv_timeout(QUIET) {
+                Ok(event) => files.extend(name(&event)),
+                Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => break,
+            }
+        }
+        settled(Batch { files, noticed_unix_ms });
+    }
+}
+
+pub(crate) fn unix_ms(time: SystemTime) -> f64 {
+    time.duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64() * 1e3
+}
+
+/// A settled batch as an event for the daemon's loop.
+pub(crate) fn send_batches<E: Send + 'static>(
+    sender: Sender<E>,
+    wrap: impl Fn(Batch) -> E + Send + 'static,
+) -> impl Fn(Batch) + Send + 'static {
+    move |batch| {
+        // Fails only when the daemon has ended.
+        let _ = sender.send(wrap(batch));
+    }
+}

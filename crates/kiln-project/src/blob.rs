@@ -1,0 +1,34 @@
+//! The store's form of a decoded panorama: `KILNPAN1`, width and height (u32 LE), then RGB as f32 LE.
+
+use kiln_build::Error;
+use kiln_image::{Image, Panorama};
+
+const MAGIC: &[u8; 8] = b"KILNPAN1";
+const HEADER_BYTES: usize = 16;
+
+pub(crate) fn encode_panorama(panorama: &Panorama) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(HEADER_BYTES + panorama.rgb().len() * 4);
+    bytes.extend_from_slice(MAGIC);
+    for size in [panorama.width(), panorama.height()] {
+        bytes.extend_from_slice(&u32::try_from(size).unwrap_or(u32::MAX).to_le_bytes());
+    }
+    panorama.rgb().iter().for_each(|value| bytes.extend_from_slice(&value.to_le_bytes()));
+    bytes
+}
+
+pub(crate) fn decode_panorama(bytes: &[u8]) -> Result<Panorama, Error> {
+    parse(bytes).ok_or_else(|| Error::Action {
+        action: "read a decoded panorama".to_owned(),
+        reason: "the store holds something else under its name".to_owned(),
+    })
+}
+
+fn parse(bytes: &[u8]) -> Option<Panorama> {
+    let (header, texels) = bytes.split_first_chunk::<HEADER_BYTES>()?;
+    let size = |at: usize| header[at..at + 4].try_into().map(u32::from_le_bytes).ok();
+    let (width, height) = (size(8)? as usize, size(12)? as usize);
+    let rgb = texels.chunks_exact(4).map(|value| f32::from_le_bytes([value[0], value[1], value[2], value[3]]));
+    let image = Image::new(width, height, rgb.collect()).ok()?;
+    (header[..8] == *MAGIC).then_some(())?;
+    Panorama::new(image).ok()
+}

@@ -1,0 +1,279 @@
+//! kiln.toml as data.
+
+use std::collections::BTreeMap;
+
+use kiln_bake::TexelFormat;
+use kiln_diagnostic::Diagnostic;
+use kiln_image::TexelPolicy;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use crate::reader::{Document, Section, suggest};
+
+/// Version of the project file that this Kiln reads.
+pub const PROJECT_VERSION: usize = 1;
+
+/// What a kiln.toml asks for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Project {
+    /// For window titles and status lines.
+    pub name: String,
+    /// `[env.NAME]`.
+    pub envs: BTreeMap<String, EnvConfig>,
+    /// `[scene.NAME]`.
+    pub scenes: BTreeMap<String, SceneConfig>,
+    /// `[shader.NAME]`.
+    pub shaders: BTreeMap<String, ShaderConfig>,
+    /// Folder for baked files, relative to the project.
+    pub output_dir: String,
+}
+
+/// An environment and the quality it is baked with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EnvConfig {
+    /// Panorama: .hdr, .exr, .png or .jpg.
+    pub source: String,
+    /// Edge of the specular chain's first level, in texels; a power of two.
+    pub size: usize,
+    /// Edge of the irradiance cube.
+    pub irradiance_size: usize,
+    /// Error asked for, relative RMS, encoding included.
+    pub error: f64,
+    /// Texel format.
+    pub format: TexelFormat,
+    /// What happens to values that a half float cannot hold.
+    pub range: Range,
+    /// What happens to NaN, infinite and negative texels.
+    pub texels: TexelPolicy,
+}
+
+/// What happens to values above 65504 when texels are half floats.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Range {
+    /// All texels are divided by a power of two, which is recorded.
+    Scale,
+    /// Such a map is stored as 32-bit floats.
+    F32,
+}
+
+/// A scene, and what it is looked at with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneConfig {
+    /// A .gltf or .glb file.
+    pub source: String,
+    /// Name of an environment.
+    pub env: String,
+    /// Name of a material shader.
+    pub shader: String,
+}
+
+/// A shader.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShaderConfig {
+    /// Its root module, a .wgsl file.
+    pub source: String,
+    /// What it is used for.
+    pub role: Role,
+}
+
+/// What a shader is used for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// Draws surfaces; compiled once per set of effects.
+    Material,
+    /// Draws the environment behind the scene.
+    Background,
+    /// Turns linear radiance into display values.
+    Tonemap,
+}
+
+impl Role {
+    /// As kiln.toml and target facts spell it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Role::Material => "material",
+            Role::Background => "background",
+            Role::Tonemap => "tonemap",
+        }
+    }
+}
+
+/// Reads kiln.toml. What is wrong is left out and said; the rest is usable.
+pub fn parse_project(text: &str) -> (Project, Vec<Diagnostic>) {
+    let (root, errors) = DeTable::parse_recoverable(text);
+    let mut document = Document { text, diagnostics: Vec::new() };
+    for error in errors {
+        let diagnostic = document.error(error.message().replace('\n', "; "), error.span().unwrap_or(0..0));
+        document.diagnostics.push(diagnostic);
+    }
+    let mut project = Project {
+        name: "kiln".to_owned(),
+        envs: BTreeMap::new(),
+        scenes: BTreeMap::new(),
+        shaders: BTreeMap::new(),
+        output_dir: "baked".to_owned(),
+    };
+    read_root(&mut document, root.get_ref(), &mut project);
+    (project, document.diagnostics)
+}
+
+const TABLES: [&str; 6] = ["version", "project", "env", "scene", "shader", "output"];
+
+fn read_root<'a>(document: &mut Document<'a>, root: &DeTable<'a>, project: &mut Project) {
+    check_version(document, root);
+    // References are checked last, against everything that was declared, broken or not.
+    let declared = |table: &str| -> Vec<String> {
+        let table = root.iter().find(|(key, _)| key.get_ref() == table);
+        let table = table.and_then(|(_, value)| value.get_ref().as_table());
+        table.into_iter().flatten().map(|(name, _)| name.get_ref().to_string()).collect()
+    };
+    let (envs, shaders) = (declared("env"), declared("shader"));
+    for (key, value) in root {
+        match key.get_ref().as_ref() {
+            "version" => {}
+            "project" => read_single(document, "project", value, |section| {
+                if let Some(name) = section.text("name") {
+                    project.name = name;
+                }
+            }),
+            "output" => read_single(document, "output", value, |section| {
+                if let Some(dir) = section.text("dir") {
+                    project.output_dir = dir;
+                }
+            }),
+            "env" => read_named(document, "env", value, |section, _| read_env(section), &mut project.envs),
+            "scene" => {
+                let read = |section: &mut Section, _: &str| read_scene(section, &envs, &shaders);
+                read_named(document, "scene", value, read, &mut project.scenes);
+            }
+            "shader" => read_named(document, "shader", value, read_shader, &mut project.shaders),
+            other => {
+                let mut diagnostic = document.error(format!("unknown table `{other}`"), key.span());
+                diagnostic.help = suggest(other, TABLES.into_iter());
+                document.diagnostics.push(diagnostic);
+            }
+        }
+    }
+}
+
+fn check_version(document: &mut Document, root: &DeTable) {
+    let version = root.iter().find(|(key, _)| key.get_ref() == "version").map(|(_, value)| value);
+    let is_known = version.and_then(|value| value.get_ref().as_integer()).is_some_and(|number| number.as_str() == "1");
+    if !is_known {
+        let place = version.map_or(0..0, Spanned::span);
+        let message = match version {
+            None => "the project file does not say its version".to_owned(),
+            Some(_) => format!("this Kiln reads project files of version {PROJECT_VERSION}"),
+        };
+        let diagnostic = document.error(message, place).with_help("the first line should be `version = 1`");
+        document.diagnostics.push(diagnostic);
+    }
+}
+
+fn read_single<'a>(
+    document: &mut Document<'a>,
+    name: &str,
+    value: &Spanned<DeValue<'a>>,
+    read: impl FnOnce(&mut Section),
+) {
+    let Some(table) = as_table(document, name, value) else { return };
+    let mut section = Section::new(document, name.to_owned(), value.span(), table);
+    read(&mut section);
+    section.finish();
+}
+
+fn read_named<'a, T>(
+    document: &mut Document<'a>,
+    kind: &str,
+    value: &Spanned<DeValue<'a>>,
+    read: impl Fn(&mut Section, &str) -> T,
+    into: &mut BTreeMap<String, T>,
+) {
+    let Some(tables) = as_table(document, kind, value) else { return };
+    for (name, value) in tables {
+        let path = format!("{kind}.{}", name.get_ref());
+        let Some(table) = as_table(document, &path, value) else { continue };
+        let mut section = Section::new(document, path.clone(), name.span(), table);
+        let config = read(&mut section, name.get_ref());
+        if !is_name(name.get_ref()) {
+            let message = format!("[{path}]: names have letters, digits, `-` and `_` only");
+            section.fail(message, name.span(), None);
+        }
+        if section.finish() {
+            into.insert(name.get_ref().to_string(), config);
+        }
+    }
+}
+
+fn as_table<'v, 'a>(
+    document: &mut Document<'a>,
+    name: &str,
+    value: &'v Spanned<DeValue<'a>>,
+) -> Option<&'v DeTable<'a>> {
+    let table = value.get_ref().as_table();
+    if table.is_none() {
+        let message = format!("`{name}` must be a table, not {}", value.get_ref().type_str());
+        let diagnostic = document.error(message, value.span()).with_help(format!("write `[{name}.NAME]`"));
+        document.diagnostics.push(diagnostic);
+    }
+    table
+}
+
+/// Names become parts of target names and file names.
+fn is_name(name: &str) -> bool {
+    let fits = |character: char| character.is_ascii_alphanumeric() || "-_".contains(character);
+    !name.is_empty() && name.len() <= 80 && name.chars().all(fits)
+}
+
+fn read_env(section: &mut Section) -> EnvConfig {
+    let config = EnvConfig {
+        source: section.required_text("source", "environments/sky.hdr"),
+        size: section.integer("size", 1..=4096).unwrap_or(256),
+        irradiance_size: section.integer("irradiance_size", 1..=1024).unwrap_or(64),
+        error: section.number("error", 1e-7..=1.0).unwrap_or(1e-3),
+        format: section
+            .choice("format", &[("rgba16f", TexelFormat::Rgba16Float), ("rgba32f", TexelFormat::Rgba32Float)])
+            .unwrap_or(TexelFormat::Rgba16Float),
+        range: section.choice("range", &[("scale", Range::Scale), ("f32", Range::F32)]).unwrap_or(Range::Scale),
+        texels: section
+            .choice(
+                "texels",
+                &[("repair", TexelPolicy::Repair), ("error", TexelPolicy::Error), ("keep", TexelPolicy::Keep)],
+            )
+            .unwrap_or(TexelPolicy::Repair),
+    };
+    if !config.size.is_power_of_two() {
+        let message = format!("`size` is {}, which is no power of two", config.size);
+        let help = format!("use {} or {}", config.size.next_power_of_two() / 2, config.size.next_power_of_two());
+        section.fail(message, section.place("size"), Some(help));
+    }
+    config
+}
+
+fn read_scene(section: &mut Section, envs: &[String], shaders: &[String]) -> SceneConfig {
+    let mut reference = |key: &'static str, declared: &[String], default: &str| {
+        let name = section.text(key).unwrap_or_else(|| default.to_owned());
+        if !declared.contains(&name) {
+            let help = suggest(&name, declared.iter().map(String::as_str))
+                .unwrap_or_else(|| format!("declared are: {}", declared.join(", ")));
+            section.fail(format!("there is no [{key}.{name}]"), section.place(key), Some(help));
+        }
+        name
+    };
+    let first_env = envs.first().cloned().unwrap_or_default();
+    SceneConfig {
+        env: reference("env", envs, &first_env),
+        shader: reference("shader", shaders, "pbr"),
+        source: section.required_text("source", "scenes/scene.gltf"),
+    }
+}
+
+fn read_shader(section: &mut Section, name: &str) -> ShaderConfig {
+    let roles = [Role::Material, Role::Background, Role::Tonemap].map(|role| (role.name(), role));
+    // A shader named after a role has it.
+    let by_name = roles.iter().find(|(role, _)| *role == name).map_or(Role::Material, |(_, role)| *role);
+    ShaderConfig {
+        source: section.required_text("source", "shaders/pbr/pbr.wgsl"),
+        role: section.choice("role", &roles).unwrap_or(by_name),
+    }
+}

@@ -1,0 +1,341 @@
+//! Actions of `[env.NAME]`: decode, analyse, and one for each map level.
+
+use std::sync::Arc;
+
+use kiln_bake::{Accuracy, Analysis, AnalysisRequest, EncodedLevel, TexelFormat};
+use kiln_build::{Action, ActionId, ActionOutput, Engine, Error, Input, Inputs, SourceState};
+use kiln_diagnostic::Diagnostic;
+use kiln_image::{Cube, Decoded, Limits, Panorama, TexelPolicy, check_texels};
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use crate::blob::{decode_panorama, encode_panorama};
+use crate::plan::{PartSpec, Planner, rank};
+use crate::{EnvConfig, Range};
+
+/// Levels of a specular chain end at this face size: smaller ones cannot carry a rough lobe's gradient
+/// through bilinear lookups.
+const SMALLEST_SPECULAR_FACE: usize = 4;
+/// Skybox faces follow the panorama (a quarter of its width sees as many texels), within these limits.
+const SKYBOX_FACES: std::ops::RangeInclusive<usize> = 16..=2048;
+/// Radiance coefficients published as `env/NAME/sh`: bands 0 … 2.
+const SH_ORDER: usize = 2;
+const SH_CONVENTION: &str = "value(direction) = sum over l, m of c[l(l+1)+m] Y_lm(direction); real orthonormal basis \
+    without Condon-Shortley phase over world axes (+Y up): Y_00 = 0.282095, Y_1-1 = 0.488603 y, Y_10 = 0.488603 z, \
+    Y_11 = 0.488603 x; linear Rec. 709; irradiance_over_pi holds E/pi";
+
+/// What later steps must know of a decoded panorama without reading it.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Report {
+    width: usize,
+    height: usize,
+    max: f32,
+}
+
+/// Adds the actions and targets of one environment.
+pub(crate) fn plan_environment(planner: &mut Planner, engine: &Engine, name: &str, env: &EnvConfig) {
+    let steps = Steps { name, env };
+    let decode = planner.graph.add(steps.decode(engine));
+    let analyse = planner.graph.add(steps.analyse(decode));
+    let skybox = planner.graph.add(steps.skybox(decode));
+    let irradiance = planner.graph.add(steps.irradiance(decode, analyse));
+    let sh = planner.graph.add(steps.sh(analyse));
+    let target = |map: &str| format!("env/{name}/{map}");
+    planner.target(target("skybox"), "cube", json!({}), vec![PartSpec::AllOf(skybox)]);
+    let meta = json!({"size": env.irradiance_size, "levels": 1});
+    planner.target(target("irradiance"), "cube", meta, vec![PartSpec::one(irradiance, "mip0")]);
+    planner.target(target("sh"), "sh", json!({"order": SH_ORDER}), vec![PartSpec::one(sh, "json")]);
+    let count = specular_level_count(env.size);
+    let levels = (0..count).map(|level| {
+        let action = match level {
+            0 => steps.mirror_level(decode),
+            _ => steps.specular_level(decode, analyse, level, count),
+        };
+        PartSpec::one(planner.graph.add(action), &format!("mip{level}"))
+    });
+    let levels = levels.collect();
+    let meta = json!({"size": env.size, "levels": count, "law": "roughness = mip / (levels - 1)"});
+    planner.target(target("specular"), "cube", meta, levels);
+}
+
+/// Levels of a chain whose first has `size` texels along an edge.
+fn specular_level_count(size: usize) -> usize {
+    let smallest = SMALLEST_SPECULAR_FACE.min(size);
+    (size / smallest).ilog2() as usize + 1
+}
+
+struct Steps<'a> {
+    name: &'a str,
+    env: &'a EnvConfig,
+}
+
+impl Steps<'_> {
+    fn action(
+        &self,
+        step: &str,
+        (kind, recipe): (&'static str, u32),
+        params: Value,
+        inputs: Vec<Input>,
+        perform: impl Fn(&Inputs) -> Result<ActionOutput, Error> + Send + Sync + 'static,
+    ) -> Action {
+        let name = format!("{kind} env/{}{step}", self.name);
+        Action { name, kind, recipe, params, inputs, rank: rank::ENVIRONMENT, perform: Arc::new(perform) }
+    }
+
+    fn encoding(&self) -> Value {
+        json!({"format": format_name(self.env.format), "range": range_name(self.env.range)})
+    }
+
+    fn decode(&self, engine: &Engine) -> Action {
+        let source = engine.source(&self.env.source);
+        let input = Input::Source { path: self.env.source.clone(), digest: source.digest() };
+        let (path, name, policy) = (self.env.source.clone(), self.name.to_owned(), self.env.texels);
+        // A file that is there but cannot be read must not share the key of one that is missing.
+        let unreadable = match source {
+            SourceState::Unreadable(reason) => Some(reason),
+            SourceState::Present(_) | SourceState::Missing => None,
+        };
+        let params = json!({"texels": policy_name(policy), "unreadable": unreadable});
+        self.action("", ("decode", 1), params, vec![input], move |inputs| {
+            Ok(match (inputs.bytes(0)?, &unreadable) {
+                (Some(bytes), _) => decode(&bytes, &path, policy),
+                (None, Some(reason)) => failure(Diagnostic::error(reason.clone()).in_file(&*path)),
+                (None, None) => failure(
+                    Diagnostic::error("the environment's file was not found")
+                        .in_file(&*path)
+                        .with_help(format!("create it, or correct `source` in [env.{name}] of kiln.toml")),
+                ),
+            })
+        })
+    }
+
+    fn analyse(&self, decode: ActionId) -> Action {
+        let count = specular_level_count(self.env.size);
+        let roughness = if count > 1 { kiln_bake::roughness_of_level(1, count) } else { 1.0 };
+        let request = AnalysisRequest { alpha_min: roughness * roughness, error: self.env.error };
+        let params = json!({"alpha_min": request.alpha_min, "error": request.error});
+        self.action("", ("analyse", 1), params, vec![output(decode, "panorama")], move |inputs| {
+            let analysis = kiln_bake::analyse(&panorama(inputs, 0)?, &request);
+            let meta = json!({"detail": {"band_limit": analysis.band_limit(), "mean": analysis.mean()}});
+            Ok(success("analysis", analysis.to_bytes(), meta))
+        })
+    }
+
+    fn skybox(&self, decode: ActionId) -> Action {
+        let env = self.env.clone();
+        let inputs = vec![output(decode, "panorama"), output(decode, "report")];
+        self.action("", ("skybox", 1), self.encoding(), inputs, move |inputs| {
+            let panorama = panorama(inputs, 0)?;
+            let report = report(inputs, 1)?;
+            let face_size = skybox_face_size(report.width);
+            let levels = kiln_bake::skybox(&panorama, face_size);
+            let encode = Encode::new(&env, &report);
+            let encoded: Vec<EncodedLevel> = levels.iter().map(|cube| encode.level(cube)).collect();
+            let mut shared = encode.facts();
+            shared["size"] = json!(face_size);
+            shared["levels"] = json!(levels.len());
+            let rounding = encoded.iter().map(|level| level.rounding_rms).fold(0.0, f64::max);
+            let meta = json!({"shared": shared, "detail": {"rounding_rms": rounding}});
+            let named = encoded.into_iter().enumerate().map(|(index, level)| (format!("mip{index}"), level.bytes));
+            Ok(ActionOutput { outputs: named.collect(), meta, diagnostics: encode.notes() })
+        })
+    }
+
+    fn irradiance(&self, decode: ActionId, analyse: ActionId) -> Action {
+        let env = self.env.clone();
+        let mut params = self.encoding();
+        params["size"] = json!(env.irradiance_size);
+        let inputs = vec![output(analyse, "analysis"), output(decode, "report")];
+        self.action("", ("irradiance", 1), params, inputs, move |inputs| {
+            let map = kiln_bake::irradiance(&analysis(inputs, 0)?, env.irradiance_size);
+            Ok(Encode::new(&env, &report(inputs, 1)?).output("mip0", &map.cube, accuracy_facts(&map.accuracy)))
+        })
+    }
+
+    fn sh(&self, analyse: ActionId) -> Action {
+        let params = json!({"order": SH_ORDER});
+        self.action("", ("sh", 1), params, vec![output(analyse, "analysis")], |inputs| {
+            let analysis = analysis(inputs, 0)?;
+            let mut text = serde_json::to_vec_pretty(&json!({
+                "convention": SH_CONVENTION,
+                "order": SH_ORDER,
+                "radiance": kiln_bake::sh(&analysis, SH_ORDER).coefficients,
+                "irradiance_over_pi": kiln_bake::irradiance_sh(&analysis).coefficients,
+            }))
+            .unwrap_or_default();
+            text.push(b'\n');
+            Ok(success("json", text, json!({})))
+        })
+    }
+
+    /// Level 0: roughness 0 sees the environment itself.
+    fn mirror_level(&self, decode: ActionId) -> Action {
+        let env = self.env.clone();
+        let mut params = self.encoding();
+        params["size"] = json!(env.size);
+        let inputs = vec![output(decode, "panorama"), output(decode, "report")];
+        self.action("/specular mip 0", ("mirror", 1), params, inputs, move |inputs| {
+            let levels = kiln_bake::skybox(&panorama(inputs, 0)?, env.size);
+            let detail = json!({"roughness": 0.0});
+            Ok(Encode::new(&env, &report(inputs, 1)?).output("mip0", &levels[0], detail))
+        })
+    }
+
+    fn specular_level(&self, decode: ActionId, analyse: ActionId, level: usize, count: usize) -> Action {
+        let env = self.env.clone();
+        let roughness = kiln_bake::roughness_of_level(level, count);
+        let face_size = env.size >> level;
+        let mut params = self.encoding();
+        params["size"] = json!(face_size);
+        params["alpha"] = json!(roughness * roughness);
+        let inputs = vec![output(analyse, "analysis"), output(decode, "report")];
+        self.action(&format!("/specular mip {level}"), ("prefilter", 1), params, inputs, move |inputs| {
+            let map = kiln_bake::specular_level(&analysis(inputs, 0)?, roughness * roughness, face_size);
+            let mut detail = accuracy_facts(&map.accuracy);
+            detail["roughness"] = json!(roughness);
+            Ok(Encode::new(&env, &report(inputs, 1)?).output(&format!("mip{level}"), &map.cube, detail))
+        })
+    }
+}
+
+fn decode(bytes: &[u8], path: &str, policy: TexelPolicy) -> ActionOutput {
+    let decoded = match kiln_image::decode(bytes, &Limits::default()) {
+        Ok(decoded) => decoded,
+        Err(error) => {
+            let help = "export the panorama again as .hdr or .exr";
+            return failure(Diagnostic::error(error.to_string()).in_file(path).with_help(help));
+        }
+    };
+    let Decoded { mut image, format, notes } = decoded;
+    let mut diagnostics: Vec<Diagnostic> =
+        notes.into_iter().map(|note| Diagnostic::note(note).in_file(path)).collect();
+    match policy.apply(&mut image) {
+        Err(error) => return failure(Diagnostic::error(error.to_string()).in_file(path)),
+        Ok(repair) if repair.non_finite + repair.negative > 0 => {
+            let message = format!(
+                "repaired {} non-finite and {} negative values; relative flux moved {:.2e}",
+                repair.non_finite, repair.negative, repair.flux_moved
+            );
+            diagnostics.push(Diagnostic::warning(message).in_file(path));
+        }
+        Ok(_) => {}
+    }
+    let max = check_texels(&image).max;
+    let (width, height) = (image.width, image.height);
+    let panorama = match Panorama::new(image) {
+        Ok(panorama) => panorama,
+        Err(error) => return failure(Diagnostic::error(error.to_string()).in_file(path)),
+    };
+    let report = serde_json::to_vec(&Report { width, height, max }).unwrap_or_default();
+    let meta = json!({"detail": {"format": format, "width": width, "height": height, "max": max}});
+    let outputs = vec![("panorama".to_owned(), encode_panorama(&panorama)), ("report".to_owned(), report)];
+    ActionOutput { outputs, meta, diagnostics }
+}
+
+/// How the maps of one environment are stored: all with the same format and scale.
+struct Encode {
+    format: TexelFormat,
+    scale_log2: i32,
+    max: f32,
+}
+
+impl Encode {
+    fn new(env: &EnvConfig, report: &Report) -> Encode {
+        let scale_log2 = kiln_bake::scale_log2(report.max);
+        let (format, scale_log2) = match (env.format, env.range) {
+            (TexelFormat::Rgba32Float, _) => (TexelFormat::Rgba32Float, 0),
+            (TexelFormat::Rgba16Float, Range::F32) if scale_log2 > 0 => (TexelFormat::Rgba32Float, 0),
+            (TexelFormat::Rgba16Float, _) => (TexelFormat::Rgba16Float, scale_log2),
+        };
+        Encode { format, scale_log2, max: report.max }
+    }
+
+    fn level(&self, cube: &Cube) -> EncodedLevel {
+        kiln_bake::encode_level(cube, self.format, self.scale_log2)
+    }
+
+    fn facts(&self) -> Value {
+        json!({"format": format_name(self.format), "scale_log2": self.scale_log2})
+    }
+
+    fn output(&self, name: &str, cube: &Cube, mut detail: Value) -> ActionOutput {
+        let level = self.level(cube);
+        detail["rounding_rms"] = json!(level.rounding_rms);
+        success(name, level.bytes, json!({"shared": self.facts(), "detail": detail}))
+    }
+
+    /// Said once per environment, with the skybox.
+    fn notes(&self) -> Vec<Diagnostic> {
+        if self.scale_log2 == 0 {
+            return Vec::new();
+        }
+        let message = format!(
+            "its peak {:.3e} is above the half float's 65504: texels are stored divided by 2^{}",
+            self.max, self.scale_log2
+        );
+        vec![Diagnostic::note(message).with_help("`range = \"f32\"` stores 32-bit floats instead")]
+    }
+}
+
+fn accuracy_facts(accuracy: &Accuracy) -> Value {
+    json!({
+        "band_limit": accuracy.band_limit,
+        "rms_bound": accuracy.rms_bound,
+        "sup_bound": accuracy.sup_bound,
+        "clamped_flux": accuracy.clamped_flux,
+    })
+}
+
+fn skybox_face_size(width: usize) -> usize {
+    (width / 4).max(1).next_power_of_two().clamp(*SKYBOX_FACES.start(), *SKYBOX_FACES.end())
+}
+
+fn output(action: ActionId, output: &str) -> Input {
+    Input::Output { action, output: output.to_owned() }
+}
+
+pub(crate) fn success(name: &str, bytes: Vec<u8>, meta: Value) -> ActionOutput {
+    ActionOutput { outputs: vec![(name.to_owned(), bytes)], meta, diagnostics: Vec::new() }
+}
+
+pub(crate) fn failure(diagnostic: Diagnostic) -> ActionOutput {
+    ActionOutput { outputs: Vec::new(), meta: Value::Null, diagnostics: vec![diagnostic] }
+}
+
+fn panorama(inputs: &Inputs, index: usize) -> Result<Panorama, Error> {
+    decode_panorama(&inputs.required(index)?)
+}
+
+fn analysis(inputs: &Inputs, index: usize) -> Result<Analysis, Error> {
+    Analysis::from_bytes(&inputs.required(index)?).map_err(|error| damaged("an analysis", &error))
+}
+
+fn report(inputs: &Inputs, index: usize) -> Result<Report, Error> {
+    serde_json::from_slice(&inputs.required(index)?).map_err(|error| damaged("a report", &error))
+}
+
+fn damaged(what: &str, error: &dyn std::fmt::Display) -> Error {
+    Error::Action { action: format!("read {what}"), reason: error.to_string() }
+}
+
+pub(crate) fn format_name(format: TexelFormat) -> &'static str {
+    match format {
+        TexelFormat::Rgba16Float => "rgba16f",
+        TexelFormat::Rgba32Float => "rgba32f",
+    }
+}
+
+fn range_name(range: Range) -> &'static str {
+    match range {
+        Range::Scale => "scale",
+        Range::F32 => "f32",
+    }
+}
+
+fn policy_name(policy: TexelPolicy) -> &'static str {
+    match policy {
+        TexelPolicy::Repair => "repair",
+        TexelPolicy::Error => "error",
+        TexelPolicy::Keep => "keep",
+    }
+}

@@ -1,0 +1,198 @@
+//! From kiln.toml and the sources to a graph of actions and the targets they make.
+
+use kiln_build::{ActionId, ActionRecord, Engine, Error, Graph, RunReport, Target, TargetState, Targets};
+use kiln_diagnostic::{Diagnostic, has_errors};
+use serde_json::{Map, Value, json};
+
+use crate::{PROJECT_FILE, Project, environment, parse_project, scene, shader};
+
+/// What must be done for a project, before any of it is done.
+pub struct Plan {
+    /// kiln.toml as data.
+    pub project: Project,
+    /// Every action.
+    pub graph: Graph,
+    /// What the actions make, by name.
+    pub targets: Vec<TargetSpec>,
+    /// What is wrong with kiln.toml or found while planning.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// A target and the actions whose outputs it consists of.
+pub struct TargetSpec {
+    /// As `env/sky/specular`.
+    pub name: String,
+    /// How to read it.
+    pub kind: &'static str,
+    /// Facts known before the actions run.
+    pub meta: Value,
+    /// Its contents in order.
+    pub parts: Vec<PartSpec>,
+}
+
+/// Where a target's contents come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PartSpec {
+    /// The output of this name, which is the part's name too.
+    One(ActionId, String),
+    /// All outputs of an action.
+    AllOf(ActionId),
+}
+
+impl PartSpec {
+    pub(crate) fn one(action: ActionId, output: &str) -> PartSpec {
+        PartSpec::One(action, output.to_owned())
+    }
+
+    /// The action it comes from.
+    pub fn action(&self) -> ActionId {
+        match self {
+            PartSpec::One(action, _) | PartSpec::AllOf(action) => *action,
+        }
+    }
+}
+
+/// Among actions that could start, these go first: what an artist waits for.
+pub(crate) mod rank {
+    pub(crate) const SHADER: u32 = 0;
+    pub(crate) const SCENE: u32 = 1;
+    pub(crate) const ENVIRONMENT: u32 = 2;
+}
+
+/// Collects actions and targets.
+#[derive(Default)]
+pub(crate) struct Planner {
+    pub(crate) graph: Graph,
+    pub(crate) targets: Vec<TargetSpec>,
+    pub(crate) diagnostics: Vec<Diagnostic>,
+}
+
+impl Planner {
+    pub(crate) fn target(&mut self, name: String, kind: &'static str, meta: Value, parts: Vec<PartSpec>) {
+        self.targets.push(TargetSpec { name, kind, meta, parts });
+    }
+}
+
+/// Plans a project: reads kiln.toml, scans scenes and shaders for what they need.
+///
+/// # Errors
+/// The store cannot be used. Errors of the project are in [`Plan::diagnostics`].
+pub fn plan(engine: &Engine) -> Result<Plan, Error> {
+    engine.sources().refresh();
+    let mut planner = Planner::default();
+    let project = read_project(engine, &mut planner.diagnostics);
+    let mut variants = shader::Variants::default();
+    for (name, config) in &project.scenes {
+        scene::plan_scene(&mut planner, engine, name, config, &mut variants)?;
+    }
+    for (name, config) in &project.shaders {
+        shader::plan_shader(&mut planner, engine, name, config, &variants)?;
+    }
+    for (name, config) in &project.envs {
+        environment::plan_environment(&mut planner, engine, name, config);
+    }
+    if !project.envs.is_empty() {
+        shader::plan_brdf_table(&mut planner);
+    }
+    let meta = json!({
+        "name": project.name,
+        "scenes": project.scenes.keys().collect::<Vec<_>>(),
+        "envs": project.envs.keys().collect::<Vec<_>>(),
+    });
+    planner.target("project".to_owned(), "project", meta, Vec::new());
+    let Planner { graph, targets, diagnostics } = planner;
+    Ok(Plan { project, graph, targets, diagnostics })
+}
+
+fn read_project(engine: &Engine, diagnostics: &mut Vec<Diagnostic>) -> Project {
+    let text = match engine.sources().read(PROJECT_FILE) {
+        None => {
+            let missing = Diagnostic::error("there is no kiln.toml in this folder")
+                .in_file(PROJECT_FILE)
+                .with_help("`kiln init DIR` makes a project that runs as it is");
+            diagnostics.push(missing);
+            "version = 1".to_owned()
+        }
+        Some(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
+    };
+    let (project, found) = parse_project(&text);
+    diagnostics.extend(found);
+    project
+}
+
+impl Plan {
+    /// Joins what the actions made into targets. One whose actions failed keeps its content in `last`, marked
+    /// stale; one that nothing asks for any more goes, unless an error may be what hides the wish for it.
+    pub fn resolve(&self, report: &RunReport, last: &Targets) -> (Targets, Vec<Diagnostic>) {
+        let mut diagnostics = self.diagnostics.clone();
+        for diagnostic in report.diagnostics() {
+            if !diagnostics.contains(diagnostic) {
+                diagnostics.push(diagnostic.clone());
+            }
+        }
+        let mut targets = Targets::new();
+        if has_errors(&diagnostics) {
+            targets.extend(last.iter().map(|(name, target)| (name.clone(), target.clone().into_stale())));
+        }
+        for spec in &self.targets {
+            if let Some(target) = resolve_target(spec, report) {
+                targets.insert(spec.name.clone(), target);
+            } else if let Some(target) = last.get(&spec.name) {
+                targets.insert(spec.name.clone(), target.clone().into_stale());
+            }
+        }
+        (targets, diagnostics)
+    }
+}
+
+fn resolve_target(spec: &TargetSpec, report: &RunReport) -> Option<Target> {
+    let mut parts = Vec::new();
+    for part in &spec.parts {
+        let outcome = report.outcome(part.action());
+        let outputs = match part {
+            PartSpec::One(_, name) => vec![outcome.output(name)?.clone()],
+            PartSpec::AllOf(_) => outcome.record.as_ref()?.outputs.clone(),
+        };
+        if outputs.is_empty() {
+            return None;
+        }
+        parts.extend(outputs.into_iter().map(|output| kiln_build::Part {
+            name: output.name,
+            digest: output.digest,
+            bytes: output.bytes,
+        }));
+    }
+    let meta = gather_meta(spec, report);
+    Some(Target { kind: spec.kind.to_owned(), state: TargetState::Fresh, meta, parts })
+}
+
+/// Facts of the target, then what its actions found out about all of it ("shared") and about each part
+/// ("detail"), and how it was made.
+fn gather_meta(spec: &TargetSpec, report: &RunReport) -> Value {
+    let mut meta: Map<String, Value> = spec.meta.as_object().cloned().unwrap_or_default();
+    let mut actions: Vec<ActionId> = spec.parts.iter().map(PartSpec::action).collect();
+    actions.dedup();
+    let records: Vec<&ActionRecord> =
+        actions.iter().filter_map(|action| report.outcome(*action).record.as_ref()).collect();
+    let mut details = Vec::new();
+    for record in &records {
+        if let Some(shared) = record.meta.get("shared").and_then(Value::as_object) {
+            meta.extend(shared.clone());
+        }
+        if let Some(detail) = record.meta.get("detail") {
+            details.push(detail.clone());
+        }
+    }
+    if !details.is_empty() {
+        meta.insert("details".to_owned(), Value::Array(details));
+    }
+    let mut recipes: Vec<Value> = Vec::new();
+    for record in records {
+        let recipe = json!({"kind": record.kind, "recipe": record.recipe, "parameters": record.params});
+        recipes.push(recipe);
+    }
+    if !recipes.is_empty() {
+        meta.insert("made_by".to_owned(), Value::Array(recipes));
+    }
+    Value::Object(meta)
+}

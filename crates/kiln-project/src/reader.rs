@@ -1,0 +1,165 @@
+//! Reads tables of kiln.toml key by key, so that every complaint has a place and a way out.
+
+use std::ops::Range;
+
+use kiln_diagnostic::Diagnostic;
+use toml::Spanned;
+use toml::de::{DeString, DeTable, DeValue};
+
+use crate::PROJECT_FILE;
+
+/// The text of kiln.toml and what was found wrong with it.
+pub(crate) struct Document<'a> {
+    pub(crate) text: &'a str,
+    pub(crate) diagnostics: Vec<Diagnostic>,
+}
+
+impl Document<'_> {
+    pub(crate) fn error(&self, message: impl Into<String>, place: Range<usize>) -> Diagnostic {
+        Diagnostic::error(message).at(PROJECT_FILE, self.text, place)
+    }
+}
+
+/// One table, as `[env.sky]`.
+pub(crate) struct Section<'a, 'd> {
+    document: &'d mut Document<'a>,
+    name: String,
+    header: Range<usize>,
+    table: &'d DeTable<'a>,
+    known: Vec<&'static str>,
+    /// Required keys that are absent, each with an example value.
+    missing: Vec<(&'static str, &'static str)>,
+    failed: bool,
+}
+
+impl<'a, 'd> Section<'a, 'd> {
+    pub(crate) fn new(
+        document: &'d mut Document<'a>,
+        name: String,
+        header: Range<usize>,
+        table: &'d DeTable<'a>,
+    ) -> Self {
+        Section { document, name, header, table, known: Vec::new(), missing: Vec::new(), failed: false }
+    }
+
+    fn find(&mut self, key: &'static str) -> Option<&'d Spanned<DeValue<'a>>> {
+        self.known.push(key);
+        self.table.iter().find(|(name, _)| name.get_ref() == key).map(|(_, value)| value)
+    }
+
+    /// Where the value of `key` stands, for later complaints; the section's header if it is absent.
+    pub(crate) fn place(&self, key: &str) -> Range<usize> {
+        let entry = self.table.iter().find(|(name, _)| name.get_ref() == key);
+        entry.map_or(self.header.clone(), |(_, value)| value.span())
+    }
+
+    pub(crate) fn fail(&mut self, message: String, place: Range<usize>, help: Option<String>) {
+        let mut diagnostic = self.document.error(message, place);
+        diagnostic.help = help;
+        self.document.diagnostics.push(diagnostic);
+        self.failed = true;
+    }
+
+    fn wrong_type(&mut self, key: &str, wanted: &str, value: &Spanned<DeValue>) {
+        let message = format!("`{key}` in [{}] must be {wanted}, not {}", self.name, value.get_ref().type_str());
+        self.fail(message, value.span(), None);
+    }
+
+    pub(crate) fn text(&mut self, key: &'static str) -> Option<String> {
+        let value = self.find(key)?;
+        match value.get_ref().as_str() {
+            Some(text) => Some(text.to_owned()),
+            None => {
+                self.wrong_type(key, "a string", value);
+                None
+            }
+        }
+    }
+
+    pub(crate) fn required_text(&mut self, key: &'static str, example: &'static str) -> String {
+        if !self.table.iter().any(|(name, _)| name.get_ref() == key) {
+            self.missing.push((key, example));
+        }
+        self.text(key).unwrap_or_default()
+    }
+
+    /// An integer within `range`.
+    pub(crate) fn integer(&mut self, key: &'static str, range: std::ops::RangeInclusive<usize>) -> Option<usize> {
+        let value = self.find(key)?;
+        let Some(integer) = value.get_ref().as_integer() else {
+            self.wrong_type(key, "an integer", value);
+            return None;
+        };
+        let digits = integer.as_str().replace('_', "");
+        let number = usize::from_str_radix(&digits, integer.radix()).ok().filter(|number| range.contains(number));
+        if number.is_none() {
+            let message =
+                format!("`{key}` in [{}] must be from {} to {}, not {digits}", self.name, range.start(), range.end());
+            self.fail(message, value.span(), None);
+        }
+        number
+    }
+
+    /// A number (integer or float) within `range`.
+    pub(crate) fn number(&mut self, key: &'static str, range: std::ops::RangeInclusive<f64>) -> Option<f64> {
+        let value = self.find(key)?;
+        let text = match value.get_ref() {
+            DeValue::Float(float) => float.as_str(),
+            DeValue::Integer(integer) => integer.as_str(),
+            _ => {
+                self.wrong_type(key, "a number", value);
+                return None;
+            }
+        };
+        let number = text.replace('_', "").parse::<f64>().ok().filter(|number| range.contains(number));
+        if number.is_none() {
+            let (low, high) = (range.start(), range.end());
+            let message = format!("`{key}` in [{}] must be from {low:e} to {high:e}, not {text}", self.name);
+            self.fail(message, value.span(), None);
+        }
+        number
+    }
+
+    /// One of a few words.
+    pub(crate) fn choice<T: Copy>(&mut self, key: &'static str, choices: &[(&str, T)]) -> Option<T> {
+        let place = self.place(key);
+        let text = self.text(key)?;
+        let chosen = choices.iter().find(|(word, _)| *word == text).map(|(_, choice)| *choice);
+        if chosen.is_none() {
+            let words: Vec<&str> = choices.iter().map(|(word, _)| *word).collect();
+            let message = format!("`{key}` in [{}] is `{text}`, which is none of {}", self.name, words.join(", "));
+            self.fail(message, place, suggest(&text, words.iter().copied()));
+        }
+        chosen
+    }
+
+    /// Complains about keys that nothing asked for and, unless one of those may be it misspelt, about required ones
+    /// that are absent; returns whether the section may be used.
+    pub(crate) fn finish(mut self) -> bool {
+        let unknown = self.table.iter().map(|(key, _)| key);
+        let unknown: Vec<&Spanned<DeString>> =
+            unknown.filter(|key| !self.known.contains(&key.get_ref().as_ref())).collect();
+        self.failed |= !self.missing.is_empty();
+        if unknown.is_empty() {
+            for (key, example) in std::mem::take(&mut self.missing) {
+                let message = format!("[{}] has no `{key}`", self.name);
+                self.fail(message, self.header.clone(), Some(format!("add `{key} = \"{example}\"`")));
+            }
+        }
+        for key in unknown {
+            let known = std::mem::take(&mut self.known);
+            let help = suggest(key.get_ref(), known.iter().copied())
+                .unwrap_or_else(|| format!("known keys are {}", known.join(", ")));
+            self.known = known;
+            self.fail(format!("unknown key `{}` in [{}]", key.get_ref(), self.name), key.span(), Some(help));
+        }
+        !self.failed
+    }
+}
+
+/// "did you mean …", if something known is close enough to what was written.
+pub(crate) fn suggest<'a>(written: &str, known: impl Iterator<Item = &'a str>) -> Option<String> {
+    let scored = known.map(|word| (strsim::jaro_winkler(written, word), word));
+    let best = scored.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(a.1)))?;
+    (best.0 > 0.75).then(|| format!("did you mean `{}`?", best.1))
+}

@@ -1,0 +1,294 @@
+use std::fs;
+use std::sync::atomic::AtomicBool;
+
+use kiln_build::{Engine, RunOptions, Status, TargetState, Targets};
+use kiln_diagnostic::{Diagnostic, Severity};
+use kiln_image::{Image, ktx2};
+
+use crate::*;
+
+const TOML: &str = r#"version = 1
+[project]
+name = "test"
+[env.room]
+source = "room.hdr"
+size = 8
+irradiance_size = 4
+[scene.quad]
+source = "quad.gltf"
+env = "room"
+shader = "flat"
+[shader.flat]
+source = "flat.wgsl"
+"#;
+
+const SHADER: &str = "
+import lib::tint::tint;
+@vertex fn vs_main(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f { return vec4f(f32(i)); }
+@fragment fn fs_main() -> @location(0) vec4f {
+    @if(unlit) return vec4f(1.0);
+    @else return vec4f(tint(), 1.0);
+}
+";
+
+/// A triangle with one material of default values and one unlit one.
+const SCENE: &str = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+"meshes":[{"primitives":[{"attributes":{"POSITION":0},"material":0},{"attributes":{"POSITION":0},"material":1}]}],
+"materials":[{"name":"plain"},{"name":"sign","extensions":{"KHR_materials_unlit":{}}}],
+"extensionsUsed":["KHR_materials_unlit"],
+"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}],
+"bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"uri":"quad.bin","byteLength":36}]}"#;
+
+struct Place {
+    folder: tempfile::TempDir,
+    cache: tempfile::TempDir,
+}
+
+impl Place {
+    fn new() -> Place {
+        let place = Place { folder: tempfile::tempdir().unwrap(), cache: tempfile::tempdir().unwrap() };
+        place.write("kiln.toml", TOML);
+        place.write("room.hdr", &panorama(1.0));
+        place.write("flat.wgsl", SHADER);
+        place.write("lib/tint.wgsl", "fn tint() -> vec3f { return vec3f(1.0, 0.5, 0.25); }");
+        place.write("quad.gltf", SCENE);
+        let corners: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+        place.write("quad.bin", corners.map(f32::to_le_bytes).as_flattened());
+        place
+    }
+
+    fn write(&self, path: &str, content: impl AsRef<[u8]>) {
+        let path = self.folder.path().join(path);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, content).unwrap();
+    }
+
+    fn edit(&self, path: &str, from: &str, to: &str) {
+        let text = fs::read_to_string(self.folder.path().join(path)).unwrap();
+        assert!(text.contains(from), "{path} has no {from}");
+        self.write(path, text.replace(from, to));
+    }
+
+    fn build(&self) -> Built {
+        let engine = Engine::open(self.folder.path(), self.cache.path()).unwrap();
+        let cancel = AtomicBool::new(false);
+        let options = RunOptions { jobs: 2, cancel: &cancel, progress: &|_| {} };
+        build(&engine, &engine.last_targets(), &options).unwrap().unwrap()
+    }
+
+    fn write_outputs(&self, targets: &Targets) -> Written {
+        let engine = Engine::open(self.folder.path(), self.cache.path()).unwrap();
+        write_outputs(engine.store(), targets, &self.folder.path().join("baked")).unwrap()
+    }
+}
+
+fn panorama(value: f32) -> Vec<u8> {
+    let texel = |index: usize| value * (0.25 + (index % 7) as f32 * 0.125);
+    kiln_image::hdr::encode(&Image::new(16, 8, (0..16 * 8 * 3).map(texel).collect()).unwrap())
+}
+
+/// Names of the actions that ran, sorted.
+fn ran(built: &Built) -> Vec<String> {
+    let mut names = built.report.ended.clone();
+    names.sort();
+    names
+}
+
+fn errors(built: &Built) -> Vec<&Diagnostic> {
+    built.diagnostics.iter().filter(|diagnostic| diagnostic.severity == Severity::Error).collect()
+}
+
+#[test]
+fn first_build_makes_every_target_and_the_second_runs_nothing() {
+    let place = Place::new();
+    let built = place.build();
+    assert!(errors(&built).is_empty(), "{:?}", built.diagnostics);
+    let names: Vec<&str> = built.targets.keys().map(String::as_str).collect();
+    let expected = [
+        "env/room/irradiance",
+        "env/room/sh",
+        "env/room/skybox",
+        "env/room/specular",
+        "lut/ggx",
+        "project",
+        "scene/quad",
+        "shader/flat/base",
+        "shader/flat/unlit",
+    ];
+    assert_eq!(names, expected);
+    let again = place.build();
+    assert!(again.report.outcomes.iter().all(|outcome| outcome.status == Status::Reused), "{:?}", ran(&again));
+    assert_eq!(again.targets, built.targets);
+}
+
+#[test]
+fn each_edit_runs_exactly_what_it_affects() {
+    let place = Place::new();
+    place.build();
+    place.edit("lib/tint.wgsl", "0.25", "0.75");
+    // The unlit variant reads the file too, but its text comes out the same.
+    assert_eq!(ran(&place.build()), ["compile shader/flat/base", "compile shader/flat/unlit"]);
+    place.edit("quad.gltf", "\"name\":\"plain\"", "\"name\":\"rough\"");
+    assert_eq!(ran(&place.build()), ["pack scene/quad"]);
+    place.edit("kiln.toml", "irradiance_size = 4", "irradiance_size = 2");
+    assert_eq!(ran(&place.build()), ["irradiance env/room"]);
+    place.write("room.hdr", panorama(2.0));
+    let expected = [
+        "analyse env/room",
+        "decode env/room",
+        "irradiance env/room",
+        "mirror env/room/specular mip 0",
+        "prefilter env/room/specular mip 1",
+        "sh env/room",
+        "skybox env/room",
+    ];
+    assert_eq!(ran(&place.build()), expected);
+    assert!(ran(&place.build()).is_empty());
+}
+
+#[test]
+fn comment_edit_recompiles_but_changes_no_target() {
+    let place = Place::new();
+    let before = place.build().targets;
+    place.edit("lib/tint.wgsl", "fn tint", "// the house colour\nfn tint");
+    let built = place.build();
+    assert_eq!(ran(&built).len(), 2);
+    assert_eq!(built.targets, before);
+}
+
+#[test]
+fn broken_shader_keeps_its_last_good_content_and_says_where() {
+    let place = Place::new();
+    let good = place.build().targets;
+    place.edit("lib/tint.wgsl", "0.5", "half");
+    let built = place.build();
+    let error = errors(&built)[0];
+    assert_eq!(error.file.as_deref(), Some("lib/tint.wgsl"));
+    assert!(error.to_string().contains("return vec3f(1.0, half, 0.25)"), "{error}");
+    let stale = &built.targets["shader/flat/base"];
+    assert_eq!(stale.state, TargetState::Stale);
+    assert_eq!(stale.parts, good["shader/flat/base"].parts);
+    assert_eq!(built.targets["env/room/specular"].state, TargetState::Fresh);
+    place.edit("lib/tint.wgsl", "half", "0.5");
+    assert_eq!(place.build().targets, good);
+}
+
+#[test]
+fn broken_environment_does_not_stop_the_rest() {
+    let place = Place::new();
+    place.write("room.hdr", "not a picture at all");
+    let built = place.build();
+    let error = errors(&built)[0];
+    assert_eq!(error.file.as_deref(), Some("room.hdr"));
+    assert_eq!(errors(&built).len(), 1);
+    assert!(!built.targets.contains_key("env/room/specular"));
+    assert_eq!(built.targets["shader/flat/base"].state, TargetState::Fresh);
+    assert_eq!(built.targets["scene/quad"].state, TargetState::Fresh);
+}
+
+#[test]
+fn missing_files_are_named_and_their_appearance_rebuilds() {
+    let place = Place::new();
+    let files = ["room.hdr", "quad.bin", "flat.wgsl"];
+    let kept: Vec<Vec<u8>> = files.map(|file| fs::read(place.folder.path().join(file)).unwrap()).into();
+    files.iter().for_each(|file| fs::remove_file(place.folder.path().join(file)).unwrap());
+    let built = place.build();
+    let text: String = errors(&built).iter().map(|error| error.to_string() + "\n").collect();
+    assert!(files.iter().all(|file| text.contains(file)), "{text}");
+    files.iter().zip(kept).for_each(|(file, bytes)| place.write(file, bytes));
+    let built = place.build();
+    assert!(errors(&built).is_empty());
+    assert!(built.targets.values().all(|target| target.state == TargetState::Fresh));
+}
+
+#[test]
+fn broken_scene_keeps_its_shader_variants() {
+    let place = Place::new();
+    place.build();
+    place.write("quad.gltf", "{ not json");
+    let built = place.build();
+    assert_eq!(errors(&built).len(), 1, "{:?}", built.diagnostics);
+    for name in ["scene/quad", "shader/flat/unlit"] {
+        assert_eq!(built.targets[name].state, TargetState::Stale, "{name}");
+    }
+}
+
+#[test]
+fn removed_section_takes_its_targets_away() {
+    let place = Place::new();
+    place.build();
+    place.edit("kiln.toml", "[scene.quad]\nsource = \"quad.gltf\"\nenv = \"room\"\nshader = \"flat\"\n", "");
+    let built = place.build();
+    assert!(!built.targets.contains_key("scene/quad") && !built.targets.contains_key("shader/flat/unlit"));
+}
+
+#[test]
+fn outputs_are_written_once_and_follow_the_targets() {
+    let place = Place::new();
+    let targets = place.build().targets;
+    let written = place.write_outputs(&targets);
+    assert!(written.written.contains(&"env/room/specular.ktx2".to_owned()), "{written:?}");
+    assert!(place.write_outputs(&targets).written.is_empty());
+    let texture = fs::read(place.folder.path().join("baked/env/room/specular.ktx2")).unwrap();
+    let texture = ktx2::read(&texture).unwrap();
+    assert_eq!((texture.faces, texture.levels.len(), texture.width), (6, 2, 8));
+    fs::remove_file(place.folder.path().join("baked/lut/ggx.ktx2")).unwrap();
+    assert_eq!(place.write_outputs(&targets).written, ["lut/ggx.ktx2"]);
+    let mut fewer = targets.clone();
+    fewer.remove("scene/quad");
+    let written = place.write_outputs(&fewer);
+    assert_eq!(written.removed, ["scene/quad.effects.json", "scene/quad.glb"]);
+    assert!(!place.folder.path().join("baked/scene/quad.glb").exists());
+}
+
+#[test]
+fn manifest_does_not_depend_on_where_the_project_is() {
+    let manifests: Vec<Vec<u8>> = (0..2)
+        .map(|_| {
+            let place = Place::new();
+            place.write_outputs(&place.build().targets);
+            fs::read(place.folder.path().join("baked/manifest.json")).unwrap()
+        })
+        .collect();
+    assert_eq!(manifests[0], manifests[1]);
+}
+
+#[test]
+fn wrong_project_files_are_explained() {
+    let cases = [
+        ("version = 2\n", "version 1", 1),
+        ("[env.a]\nsource = \"a.hdr\"\n", "does not say its version", 1),
+        ("version = 1\n[env.a]\nsouce = \"a.hdr\"\n", "did you mean `source`?", 3),
+        ("version = 1\n[env.a]\nsize = 64\n", "[env.a] has no `source`", 2),
+        ("version = 1\n[env.a]\nsource = \"a.hdr\"\nsize = 100\n", "use 64 or 128", 4),
+        ("version = 1\n[env.a]\nsource = 5\n", "must be a string", 3),
+        ("version = 1\n[env.a]\nsource = \"a.hdr\"\nerror = 0\n", "`error` in [env.a] must be from", 4),
+        ("version = 1\n[env.a]\nsource = \"a.hdr\"\nformat = \"rgba16\"\n", "did you mean `rgba16f`?", 4),
+        ("version = 1\n[envs.a]\nsource = \"a.hdr\"\n", "did you mean `env`?", 2),
+        ("version = 1\n[env.sky]\nsource = \"a\"\n[scene.s]\nsource = \"s\"\nenv = \"skyy\"\n[shader.pbr]\nsource = \"p\"\n", "did you mean `sky`?", 6),
+        ("version = 1\n[env.a\nsource = \"a.hdr\"\n", "", 2),
+        ("version = 1\n[env.\"a/b\"]\nsource = \"a.hdr\"\n", "letters, digits", 2),
+    ];
+    for (text, expected, line) in cases {
+        let (_, diagnostics) = parse_project(text);
+        let found = diagnostics.iter().find(|diagnostic| {
+            diagnostic.to_string().contains(expected) && diagnostic.span.as_ref().is_some_and(|span| span.line == line)
+        });
+        assert!(found.is_some(), "{text}\nwanted {expected:?} in line {line}, got {diagnostics:#?}");
+    }
+    assert_eq!(parse_project("version = 1\n[env.a]\nsouce = \"a.hdr\"\n").1.len(), 1, "one fault, one message");
+    assert!(parse_project(TOML).1.is_empty());
+}
+
+#[test]
+fn section_with_an_error_is_left_out_and_the_others_are_used() {
+    let text = "version = 1\n[env.a]\nsource = \"a.hdr\"\n[env.b]\nsource = \"b.hdr\"\nsizes = 4\n";
+    let (project, diagnostics) = parse_project(text);
+    assert_eq!(project.envs.keys().collect::<Vec<_>>(), ["a"]);
+    assert_eq!(diagnostics.len(), 1);
+}
+
+#[test]
+fn equal_builds_give_equal_targets_in_fresh_stores() {
+    assert_eq!(Place::new().build().targets, Place::new().build().targets);
+}

@@ -1,0 +1,187 @@
+//! The canonical form of a shader: WGSL emitted by naga, with the author's names where a renderer binds by them.
+//!
+//! naga's writer makes names unique and appends `_` to those that end in a digit. Names that matter outside
+//! (global variables, entry points, struct members, overrides) are therefore handed to it as placeholders
+//! that it leaves alone, and put back into its text; a local that then has the same name gets another.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use naga::back::wgsl::WriterFlags;
+use naga::compact::{KeepUnused, compact};
+use naga::valid::ModuleInfo;
+use naga::{Expression, Module, TypeInner, UniqueArena};
+
+use crate::token::{self, Kind, Token};
+
+/// Removes what no entry point uses, named constants too.
+pub fn strip_unused(module: &mut Module) {
+    loop {
+        compact(module, KeepUnused::No);
+        // naga keeps named constants; without its name an unused one goes with the next round.
+        let unused = unused_constants(module);
+        if unused.is_empty() {
+            return;
+        }
+        for handle in unused {
+            module.constants[handle].name = None;
+        }
+    }
+}
+
+fn unused_constants(module: &Module) -> Vec<naga::Handle<naga::Constant>> {
+    let functions = module.functions.iter().map(|(_, function)| function);
+    let functions = functions.chain(module.entry_points.iter().map(|entry| &entry.function));
+    let expressions =
+        functions.flat_map(|function| function.expressions.iter()).chain(module.global_expressions.iter());
+    let used: BTreeSet<_> = expressions
+        .filter_map(|(_, expression)| match expression {
+            Expression::Constant(handle) => Some(handle.index()),
+            _ => None,
+        })
+        .collect();
+    let named = module.constants.iter().filter(|(_, constant)| constant.name.is_some());
+    named.map(|(handle, _)| handle).filter(|handle| !used.contains(&handle.index())).collect()
+}
+
+/// Emits a valid module.
+pub fn emit(module: &Module, info: &ModuleInfo) -> Result<String, String> {
+    let mut module = module.clone();
+    let kept = replace_names(&mut module);
+    let text = naga::back::wgsl::write_string(&module, info, WriterFlags::empty())
+        .map_err(|error| format!("cannot write canonical WGSL: {error}"))?;
+    restore_names(&text, &kept)
+}
+
+/// Placeholders with the names they stand for.
+struct Kept {
+    prefix: String,
+    names: BTreeMap<String, String>,
+    /// Those of `names` that a local could hide; members have a scope of their own.
+    globals: BTreeSet<String>,
+}
+
+impl Kept {
+    fn hide_member(&mut self, name: &mut String) {
+        let placeholder = format!("{}{}", self.prefix, letters(self.names.len()));
+        self.names.insert(placeholder.clone(), std::mem::replace(name, placeholder));
+    }
+
+    /// Replaces `name` by a new placeholder, unless it is a name of WGSL's own that the text may need.
+    fn hide_global(&mut self, name: &mut String) {
+        if !naga::keywords::wgsl::BUILTIN_IDENTIFIERS.contains(&name.as_str()) && !is_baked(name) {
+            self.globals.insert(name.clone());
+            self.hide_member(name);
+        }
+    }
+}
+
+/// Whether `name` looks like what naga calls intermediate results.
+fn is_baked(name: &str) -> bool {
+    name.strip_prefix("_e").is_some_and(|rest| rest.bytes().all(|byte| byte.is_ascii_digit()))
+}
+
+/// `number` in letters: naga changes names that end in digits.
+fn letters(mut number: usize) -> String {
+    let mut text = String::new();
+    loop {
+        text.insert(0, char::from(b'a' + u8::try_from(number % 26).unwrap_or(0)));
+        number /= 26;
+        if number == 0 {
+            return text;
+        }
+    }
+}
+
+fn replace_names(module: &mut Module) -> Kept {
+    let mut kept = Kept { prefix: unused_prefix(module), names: BTreeMap::new(), globals: BTreeSet::new() };
+    let mut types = UniqueArena::new();
+    for (handle, ty) in module.types.iter() {
+        let mut ty = ty.clone();
+        if let TypeInner::Struct { members, .. } = &mut ty.inner {
+            // Members of predeclared structs, as `modf` returns, are WGSL's own.
+            let predeclared = ty.name.as_ref().is_some_and(|name| name.starts_with("__"));
+            let names = members.iter_mut().filter_map(|member| member.name.as_mut());
+            names.filter(|_| !predeclared).for_each(|name| kept.hide_member(name));
+        }
+        types.insert(ty, module.types.get_span(handle));
+    }
+    module.types = types;
+    for (_, variable) in module.global_variables.iter_mut() {
+        variable.name.iter_mut().for_each(|name| kept.hide_global(name));
+    }
+    for (_, constant) in module.overrides.iter_mut() {
+        constant.name.iter_mut().for_each(|name| kept.hide_global(name));
+    }
+    for entry in &mut module.entry_points {
+        kept.hide_global(&mut entry.name);
+    }
+    kept
+}
+
+/// A prefix that no name of the module starts with.
+fn unused_prefix(module: &Module) -> String {
+    let mut names: Vec<&str> = Vec::new();
+    let functions = module.functions.iter().map(|(_, function)| function);
+    for function in functions.chain(module.entry_points.iter().map(|entry| &entry.function)) {
+        names.extend(function.name.as_deref());
+        names.extend(function.arguments.iter().filter_map(|argument| argument.name.as_deref()));
+        names.extend(function.local_variables.iter().filter_map(|(_, local)| local.name.as_deref()));
+        names.extend(function.named_expressions.values().map(String::as_str));
+    }
+    names.extend(module.constants.iter().filter_map(|(_, constant)| constant.name.as_deref()));
+    names.extend(module.types.iter().filter_map(|(_, ty)| ty.name.as_deref()));
+    let mut prefix = "kept_".to_owned();
+    while names.iter().any(|name| name.starts_with(&prefix)) {
+        prefix.insert(0, 'k');
+    }
+    prefix
+}
+
+fn restore_names(text: &str, kept: &Kept) -> Result<String, String> {
+    let tokens = token::tokenize(text).map_err(|_| "canonical text does not tokenise".to_owned())?;
+    let renamed = rename_collisions(text, &tokens, kept);
+    let mut restored = String::with_capacity(text.len());
+    let mut at = 0;
+    for (index, token) in tokens.iter().enumerate() {
+        let word = &text[token.range()];
+        let name = kept.names.get(word).or_else(|| {
+            let renamed = renamed.get(word)?;
+            is_plain_name(text, &tokens, index).then_some(renamed)
+        });
+        if let Some(name) = name {
+            restored.push_str(&text[at..token.start]);
+            restored.push_str(name);
+            at = token.end;
+        }
+    }
+    restored.push_str(&text[at..]);
+    Ok(restored)
+}
+
+/// New names for locals, functions and types that have a kept name.
+fn rename_collisions(text: &str, tokens: &[Token], kept: &Kept) -> BTreeMap<String, String> {
+    let words = tokens.iter().filter(|token| token.kind == Kind::Word);
+    let present: BTreeSet<&str> = words.map(|token| &text[token.range()]).collect();
+    let mut renamed = BTreeMap::new();
+    for name in present.iter().filter(|name| kept.globals.contains(**name)) {
+        let mut new = format!("{name}_v");
+        while present.contains(new.as_str()) || kept.globals.contains(&new) {
+            new.push('v');
+        }
+        renamed.insert((*name).to_owned(), new);
+    }
+    renamed
+}
+
+/// Whether token `index` names something declared in the text: not a component, and not an attribute
+/// or its argument, as in `@builtin(position)`.
+fn is_plain_name(text: &str, tokens: &[Token], index: usize) -> bool {
+    let before = |count: usize| index.checked_sub(count).map(|index| &tokens[index]);
+    let is_component = before(1).is_some_and(|token| token.is('.'));
+    let is_attribute = before(1).is_some_and(|token| token.is('@'));
+    let in_builtin = before(1).is_some_and(|token| token.is('('))
+        && before(2)
+            .is_some_and(|token| ["builtin", "interpolate"].iter().any(|word| token.is_word(text, word)))
+        && before(3).is_some_and(|token| token.is('@'));
+    !(is_component || is_attribute || in_builtin)
+}

@@ -1,0 +1,116 @@
+//! Turns naga's errors into diagnostics at their author's file and line.
+
+use std::ops::Range;
+
+use kiln_diagnostic::{Diagnostic, Span};
+
+use crate::front::Fault;
+use crate::join::Linked;
+use crate::link::Graph;
+use crate::suggest;
+use crate::token::{self, Kind};
+
+/// Explains `fault` of the linked text.
+pub fn diagnostic(graph: &Graph, linked: &Linked, fault: Fault) -> Diagnostic {
+    let root = graph.modules.first().map_or("", |module| module.path.as_str());
+    match fault {
+        Fault::Source(finding) => Finder { graph, linked, root }.diagnostic(finding),
+        Fault::NoEntryPoint => Diagnostic::error(fault.to_string())
+            .in_file(root)
+            .with_help("mark a function with `@vertex`, `@fragment` or `@compute`"),
+        Fault::TooDeep => Diagnostic::error(fault.to_string())
+            .in_file(root)
+            .with_help("split long expressions with `let`, and use `switch` for long chains"),
+        Fault::TooLong { .. } => Diagnostic::error(fault.to_string()).in_file(root),
+        Fault::Internal(_) => Diagnostic::error(fault.to_string()).in_file(root).with_help(
+            "this is a fault of the compiler, not only of the shader; undo the last edit to go on",
+        ),
+    }
+}
+
+/// What naga found wrong with the linked text.
+#[derive(Debug)]
+pub struct Finding {
+    /// What is wrong.
+    pub message: String,
+    /// Why.
+    pub notes: Vec<String>,
+    /// Bytes of the linked text that it is about, the main ones first, with what each is.
+    pub labels: Vec<(Range<usize>, String)>,
+}
+
+struct Finder<'a> {
+    graph: &'a Graph,
+    linked: &'a Linked,
+    root: &'a str,
+}
+
+impl Finder<'_> {
+    fn diagnostic(&self, finding: Finding) -> Diagnostic {
+        let mut labels = finding.labels.into_iter();
+        let main = labels.next().map(|(range, _)| range);
+        let origin = main.clone().and_then(|range| self.linked.origin(range));
+        let (Some(main), Some((module, range))) = (main, origin) else {
+            let mut diagnostic = Diagnostic::error(finding.message).in_file(self.root);
+            diagnostic.notes = finding.notes;
+            return diagnostic;
+        };
+        let help = self.help(module, &finding.message, main, range.clone());
+        let mut diagnostic = self.graph.error_at(module, range, finding.message);
+        let labels = labels.filter_map(|(range, label)| self.place(range, &label));
+        let notes: Vec<String> = finding.notes.into_iter().chain(labels).collect();
+        diagnostic.notes.splice(0..0, notes);
+        diagnostic.help = help;
+        diagnostic
+    }
+
+    /// `what: file:line:column`
+    fn place(&self, range: Range<usize>, label: &str) -> Option<String> {
+        let (module, range) = self.linked.origin(range)?;
+        let module = &self.graph.modules[module];
+        let span = Span::new(&module.text, range);
+        // naga names labels of validation errors by its own types.
+        let label = if label.is_empty() || label.starts_with("naga::") { "see" } else { label };
+        Some(format!("{label}: {}:{}:{}", module.path, span.line, span.column))
+    }
+
+    /// `linked` and `range` are the same bytes, of the linked text and of the module.
+    fn help(
+        &self,
+        module: usize,
+        message: &str,
+        linked: Range<usize>,
+        range: Range<usize>,
+    ) -> Option<String> {
+        let text = &self.graph.modules[module].text;
+        if message.starts_with("no definition in scope") {
+            let globals = self.graph.modules.iter().flat_map(|module| &module.outline.declarations);
+            let globals = globals.map(|name| name.name.as_str());
+            let builtins = naga::keywords::wgsl::BUILTIN_IDENTIFIERS.iter().copied();
+            let names = words(text).into_iter().chain(globals).chain(builtins);
+            did_you_mean(self.linked.text.get(linked)?, names)
+        } else if message.starts_with("invalid field accessor") {
+            let texts = self.graph.modules.iter().flat_map(|module| words(&module.text));
+            did_you_mean(self.linked.text.get(linked)?, texts)
+        } else if message.starts_with("expected `;`") {
+            let before = text[..range.start].trim_end();
+            let line = Span::new(text, before.len()..before.len()).line;
+            Some(format!("a `;` may be missing at the end of line {line}"))
+        } else if message.contains("`f16`") {
+            Some("Kiln compiles for devices without optional features: use `f32`".to_owned())
+        } else {
+            None
+        }
+    }
+}
+
+fn words(text: &str) -> Vec<&str> {
+    // Text that does not tokenise never reaches naga.
+    let tokens = token::tokenize(text).unwrap_or_default();
+    let words = tokens.iter().filter(|token| token.kind == Kind::Word);
+    words.map(|token| &text[token.range()]).collect()
+}
+
+fn did_you_mean<'a>(wrong: &str, names: impl Iterator<Item = &'a str>) -> Option<String> {
+    suggest::closest(wrong, names).map(|name| format!("did you mean `{name}`?"))
+}

@@ -1,0 +1,100 @@
+//! Runs naga over linked text, on a thread of its own.
+
+use naga::front::wgsl::ParseError;
+use naga::valid::{Capabilities, ModuleInfo, ValidationError, ValidationFlags, Validator};
+use naga::{Module, WithSpan};
+
+use crate::explain::Finding;
+use crate::{Compiled, canonical, describe, interface, limits};
+
+/// Stack of the thread that naga runs on. Its front end, validator and writer recurse over expressions and
+/// blocks, whose depth `limits` bounds; `tests::deepest_allowed_*` runs the worst case on this stack.
+const STACK_BYTES: usize = 64 << 20;
+
+/// Why linked text has no compiled form.
+#[derive(Debug, thiserror::Error)]
+pub enum Fault {
+    /// The linked text is longer than the limit.
+    #[error("linked shader has {actual} bytes, the limit is {limit}")]
+    TooLong {
+        /// Bytes allowed.
+        limit: usize,
+        /// Bytes there are.
+        actual: usize,
+    },
+    /// It breaks a rule of WGSL, or needs what wgpu does not offer by default.
+    #[error("{}", .0.message)]
+    Source(Finding),
+    /// Nothing in it can be drawn or dispatched.
+    #[error("this shader has no entry point")]
+    NoEntryPoint,
+    /// naga's writer puts parentheses around each operation, and its parser refuses what nests too deep.
+    #[error("an expression or `else if` chain is too long to be written out")]
+    TooDeep,
+    /// naga's own fault.
+    #[error("the shader compiler failed: {0}")]
+    Internal(String),
+}
+
+/// Parses, validates, compacts, emits and reflects.
+pub fn compile_linked(text: &str) -> Result<Compiled, Fault> {
+    if text.len() > limits::LINKED_BYTES_MAX {
+        return Err(Fault::TooLong { limit: limits::LINKED_BYTES_MAX, actual: text.len() });
+    }
+    std::thread::scope(|scope| {
+        let builder = std::thread::Builder::new().name("kiln-shader".to_owned()).stack_size(STACK_BYTES);
+        let worker = builder
+            .spawn_scoped(scope, || run(text))
+            .map_err(|error| Fault::Internal(format!("no thread: {error}")))?;
+        // naga panics on some hostile input (gfx-rs/wgpu #9499, #7687): that ends this thread only.
+        worker.join().unwrap_or_else(|panic| Err(Fault::Internal(panic_text(panic.as_ref()))))
+    })
+}
+
+fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "panic".to_owned())
+}
+
+fn run(text: &str) -> Result<Compiled, Fault> {
+    let mut module =
+        naga::front::wgsl::parse_str(text).map_err(|error| Fault::Source(parse_finding(&error)))?;
+    validate(&module).map_err(|error| Fault::Source(validation_finding(&module, &error)))?;
+    if module.entry_points.is_empty() {
+        return Err(Fault::NoEntryPoint);
+    }
+    canonical::strip_unused(&mut module);
+    let info = validate(&module).map_err(|error| Fault::Internal(format!("after compaction: {error:?}")))?;
+    let wgsl = canonical::emit(&module, &info).map_err(Fault::Internal)?;
+    let reparsed = naga::front::wgsl::parse_str(&wgsl).map_err(|error| reparse_fault(&error, &wgsl))?;
+    let reflection = interface::reflect(&module, &info, &reparsed).map_err(Fault::Internal)?;
+    Ok(Compiled { wgsl, reflection })
+}
+
+fn reparse_fault(error: &ParseError, wgsl: &str) -> Fault {
+    let text = error.emit_to_string(wgsl);
+    if ["recursion limit", "nesting limit"].iter().any(|limit| text.contains(limit)) {
+        return Fault::TooDeep;
+    }
+    Fault::Internal(format!("canonical text does not parse: {text}"))
+}
+
+fn validate(module: &Module) -> Result<ModuleInfo, Box<WithSpan<ValidationError>>> {
+    // naga's default capabilities are those of a wgpu device without optional features.
+    Validator::new(ValidationFlags::all(), Capabilities::default()).validate(module).map_err(Box::new)
+}
+
+fn parse_finding(error: &ParseError) -> Finding {
+    let labels = error.labels().filter_map(|(span, label)| Some((span.to_range()?, label.to_owned())));
+    let notes = error.notes().map(str::to_owned).collect();
+    Finding { message: describe::clean(error.message()), notes, labels: labels.collect() }
+}
+
+fn validation_finding(module: &Module, error: &WithSpan<ValidationError>) -> Finding {
+    let labels = error.spans().filter_map(|(span, label)| Some((span.to_range()?, label.clone())));
+    let mut labels: Vec<_> = labels.collect();
+    // naga lists the function before the expression in it.
+    labels.sort_by_key(|(range, _)| range.len());
+    let (message, notes) = describe::validation_error(module, error.as_inner());
+    Finding { message, notes, labels }
+}

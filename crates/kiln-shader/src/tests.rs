@@ -1,0 +1,41 @@
+//! Tests of the whole crate: sources in, rendered diagnostics or canonical text out.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use crate::{Compiled, Outcome, compile};
+
+mod canonical;
+mod conditions;
+mod diagnostics;
+mod hostile;
+mod shaders;
+
+/// A project in memory.
+struct Files(BTreeMap<String, Arc<str>>);
+
+impl Files {
+    fn new(files: &[(&str, &str)]) -> Self {
+        Files(files.iter().map(|(path, text)| ((*path).to_owned(), Arc::from(*text))).collect())
+    }
+
+    fn compile(&self, root: &str, features: &[&str]) -> Outcome {
+        compile(root, &set(features), &mut |path| self.0.get(path).cloned())
+    }
+}
+
+fn set(features: &[&str]) -> BTreeSet<String> {
+    features.iter().map(|&feature| feature.to_owned()).collect()
+}
+
+/// All diagnostics as the user sees them.
+fn rendered(outcome: &Outcome) -> String {
+    let texts: Vec<String> = outcome.diagnostics.iter().map(ToString::to_string).collect();
+    texts.join("\n")
+}
+
+#[track_caller]
+fn compiled(outcome: Outcome) -> Compiled {
+    let text = rendered(&outcome);
+    outcome.compiled.unwrap_or_else(|| panic!("does not compile:\n{text}"))
+}

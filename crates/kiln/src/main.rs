@@ -1,0 +1,41 @@
+//! The `kiln` command.
+//!
+//! Start at [`main`]: it parses the command line and hands over to one module of `commands`.
+//!
+//! Conventions: what a person asked for goes to standard output, progress and complaints to standard error; with
+//! `--json` standard output holds JSON alone. Exit code 0: done; 1: the input is wrong; 2: the tool failed.
+//!
+//! Not here: any work on light, shaders or scenes.
+
+#![expect(clippy::print_stdout, clippy::print_stderr, reason = "this is the program that talks to the user")]
+
+use std::process::ExitCode;
+
+use clap::Parser as _;
+
+mod args;
+mod commands;
+mod place;
+mod report;
+mod sheet;
+
+/// The input is wrong, and the diagnostics have said how.
+pub(crate) const INPUT_IS_WRONG: u8 = 1;
+/// The tool could not do its work.
+pub(crate) const TOOL_FAILED: u8 = 2;
+
+fn main() -> ExitCode {
+    let args = args::Args::parse();
+    let result = match args.command {
+        args::Command::Init(args) => commands::init::run(&args),
+        args::Command::Bake(args) => commands::bake::run(&args),
+        args::Command::Watch(args) => commands::watch::run(&args),
+        #[cfg(feature = "preview")]
+        args::Command::Preview(args) => commands::preview::run(&args),
+        args::Command::Demo(args) => commands::demo::run(&args),
+    };
+    result.unwrap_or_else(|error| {
+        eprintln!("kiln: {error:#}");
+        ExitCode::from(TOOL_FAILED)
+    })
+}

@@ -1,0 +1,41 @@
+//! Where things are on this machine.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, bail};
+
+/// The store: `KILN_CACHE`, or `kiln` in the user's cache folder.
+pub(crate) fn cache_folder() -> anyhow::Result<PathBuf> {
+    let variable = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    if let Some(cache) = variable("KILN_CACHE") {
+        return Ok(cache);
+    }
+    let Some(home) = variable("HOME") else { bail!("neither KILN_CACHE nor HOME is set: no place for the cache") };
+    let default = if cfg!(target_os = "macos") { home.join("Library/Caches") } else { home.join(".cache") };
+    Ok(variable("XDG_CACHE_HOME").filter(|path| path.is_absolute()).unwrap_or(default).join("kiln"))
+}
+
+/// Worker threads: as asked, else one for each core.
+pub(crate) fn jobs(asked: Option<usize>) -> usize {
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+    asked.unwrap_or_else(cores).max(1)
+}
+
+/// The socket of the project in `dir`.
+#[cfg(feature = "preview")]
+pub(crate) fn socket_of(dir: &Path) -> anyhow::Result<PathBuf> {
+    let folder = project_folder(dir)?;
+    kiln_link::socket_path(&folder).context("finding the project's socket")
+}
+
+/// The canonical folder of a project.
+pub(crate) fn project_folder(dir: &Path) -> anyhow::Result<PathBuf> {
+    dir.canonicalize().with_context(|| format!("there is no folder {}", dir.display()))
+}
+
+/// Whether a window could be opened.
+#[cfg(feature = "preview")]
+pub(crate) fn has_display() -> bool {
+    let set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    cfg!(any(windows, target_os = "macos")) || set("DISPLAY") || set("WAYLAND_DISPLAY")
+}

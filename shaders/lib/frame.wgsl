@@ -1,0 +1,24 @@
+// What is the same for the whole frame. See docs/shader-interface.md, group 0.
+
+struct Frame {
+    clip_from_world: mat4x4f,
+    world_from_clip: mat4x4f,
+    environment_from_world: mat4x4f,
+    camera_position: vec3f,
+    exposure: f32,
+    environment_intensity: f32,
+    specular_level_max: f32,
+    skybox_scale: f32,
+    irradiance_scale: f32,
+    specular_scale: f32,
+    background_blur: f32,
+}
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var env_skybox: texture_cube<f32>;
+@group(0) @binding(2) var env_irradiance: texture_cube<f32>;
+@group(0) @binding(3) var env_specular: texture_cube<f32>;
+@group(0) @binding(4) var lut_ggx: texture_2d<f32>;
+@group(0) @binding(5) var env_sampler: sampler;
+@group(0) @binding(6) var lut_sampler: sampler;
+@group(0) @binding(7) var hdr_color: texture_2d<f32>;

@@ -1,0 +1,41 @@
+//! `cargo xtask test`: everything that must hold.
+
+use crate::packages::install_missing;
+use crate::shell::{cargo, step};
+
+/// Runs all tests, then fmt, clippy and docs, in one profile so that nothing is built twice.
+pub(crate) fn run(may_install: bool) -> Result<(), String> {
+    let missing = if may_install { install_missing() } else { Vec::new() };
+    if !missing.is_empty() {
+        eprintln!(
+            "note: {} not found and not installed here; tests that need them say SKIPPED.\n  \
+             help: sudo apt-get install {}",
+            missing.join(", "),
+            missing.join(" ")
+        );
+    }
+    if std::env::var_os("KILN_CORPUS").is_none() {
+        eprintln!("note: KILN_CORPUS is not set: tests on real files from elsewhere say SKIPPED");
+    }
+    step("fmt", &mut cargo(&["fmt", "--all", "--check"]))?;
+    step("build", &mut cargo(&["test", "--release", "--workspace", "--no-run"]))?;
+    let mut tests = cargo(&["test", "--release", "--workspace"]);
+    if missing.is_empty() {
+        // Nothing may be skipped for lack of a device where the device is known to be there.
+        tests.env("KILN_REQUIRE_GPU", "1");
+    }
+    step("tests", &mut tests)?;
+    step("clippy", &mut cargo(&["clippy", "--release", "--workspace", "--all-targets", "--", "-D", "warnings"]))?;
+    step("clippy without the preview", &mut cargo(&[
+        "clippy",
+        "--release",
+        "--package",
+        "kiln",
+        "--no-default-features",
+        "--",
+        "-D",
+        "warnings",
+    ]))?;
+    let mut docs = cargo(&["doc", "--release", "--workspace", "--no-deps", "--document-private-items"]);
+    step("docs", docs.env("RUSTDOCFLAGS", "-D warnings"))
+}
