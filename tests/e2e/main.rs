@@ -2,10 +2,15 @@
 //!
 //! Nothing sleeps: every wait is for an event, with a limit.
 
+#![expect(clippy::print_stderr, reason = "skipped tests say so")]
+
 mod bad_input;
 mod bake;
 mod demo;
+#[cfg(feature = "preview")]
 mod golden;
 mod harness;
 mod live;
+mod tidy;
+#[cfg(feature = "preview")]
 mod window;

@@ -52,6 +52,9 @@ pub(crate) struct SampleArgs {
     /// Height of the generated sun above the horizon, in degrees
     #[arg(long, default_value_t = 38.0, allow_negative_numbers = true)]
     pub(crate) sun_elevation: f64,
+    /// Where the generated sun stands, in degrees from straight ahead (-Z) towards the right (+X)
+    #[arg(long, default_value_t = 40.0, allow_negative_numbers = true)]
+    pub(crate) sun_azimuth: f64,
 }
 
 #[derive(Debug, ClapArgs)]
@@ -97,6 +100,9 @@ pub(crate) struct PreviewArgs {
     /// Number of frames to write
     #[arg(long, default_value_t = 1, requires = "headless")]
     pub(crate) frames: usize,
+    /// Go on: write revision_0001.png … for every revision until ended, through daemons that come and go
+    #[arg(long, requires = "headless", conflicts_with_all = ["frames", "turn", "json"])]
+    pub(crate) follow: bool,
     /// Folder for frame_0001.png … and report.json
     #[arg(long, default_value = "frames", requires = "headless")]
     pub(crate) out: PathBuf,

@@ -35,7 +35,9 @@ pub(crate) fn write_sample(dir: &Path, args: &SampleArgs) -> anyhow::Result<Vec<
 }
 
 pub(crate) fn options(args: &SampleArgs) -> kiln_sample::SampleOptions {
-    let default = kiln_sample::SampleOptions::default();
-    let sun = kiln_sample::sky::SunPosition { elevation_deg: args.sun_elevation, ..default.sun };
-    kiln_sample::SampleOptions { panorama_width: args.panorama_width as usize, sun, ..default }
+    let sun = kiln_sample::sky::SunPosition {
+        elevation_deg: args.sun_elevation,
+        azimuth_deg: args.sun_azimuth,
+    };
+    kiln_sample::SampleOptions { panorama_width: args.panorama_width as usize, sun }
 }

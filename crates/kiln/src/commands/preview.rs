@@ -1,17 +1,27 @@
 //! `kiln preview`: the window, or pictures without one.
 
 use std::process::ExitCode;
-use std::time::Duration;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
+use anyhow::Context as _;
+use kiln_gpu::Gpu;
+use kiln_link::{Client, ClientEvent, FrameReport};
+use kiln_preview::HeadlessViewer;
 use kiln_preview::{HeadlessOptions, Selection, View, WindowOptions, run_headless, run_window};
 
 use crate::args::PreviewArgs;
 use crate::{INPUT_IS_WRONG, place, report};
 
+/// Width and height of the window when it opens.
+const WINDOW_POINTS: [f32; 2] = [1280.0, 760.0];
+
 pub(crate) fn run(args: &PreviewArgs) -> anyhow::Result<ExitCode> {
     let selection = Selection { scene: args.scene.clone(), env: args.env.clone() };
     let view = View { exposure_ev: args.exposure, ..View::default() };
     let socket = place::socket_of(&args.dir)?;
+    if args.follow {
+        return follow(args, socket, selection, view);
+    }
     if args.headless {
         return headless(args, socket, selection, view);
     }
@@ -22,7 +32,9 @@ pub(crate) fn run(args: &PreviewArgs) -> anyhow::Result<ExitCode> {
         );
         return Ok(ExitCode::from(INPUT_IS_WRONG));
     }
-    run_window(WindowOptions { socket, selection, view })?;
+    let folder = place::project_folder(&args.dir)?;
+    let name = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    run_window(WindowOptions { socket, title: format!("{name} — Kiln"), size: WINDOW_POINTS, selection, view })?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -59,4 +71,42 @@ fn headless(
         println!("{}  ({})", file.display(), report::duration(*ms));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Writes a picture of every revision until the process is ended.
+fn follow(
+    args: &PreviewArgs,
+    socket: std::path::PathBuf,
+    selection: Selection,
+    view: View,
+) -> anyhow::Result<ExitCode> {
+    std::fs::create_dir_all(&args.out).with_context(|| format!("making the folder {}", args.out.display()))?;
+    let mut viewer = HeadlessViewer::new(Gpu::headless()?, args.size);
+    viewer.view = view;
+    viewer.select(selection);
+    let client = Client::connect(socket, "preview, following");
+    while let Ok(event) = client.events().recv() {
+        match event {
+            ClientEvent::Connected { project } => println!("connected to {project}"),
+            ClientEvent::Disconnected { reason } => println!("waiting: {reason}"),
+            ClientEvent::Progress { .. } => {}
+            ClientEvent::Revision(revision) => {
+                let received_unix_ms = unix_ms();
+                let applied = viewer.apply(&revision);
+                let ready_unix_ms = unix_ms();
+                viewer.draw()?;
+                let (revision, drawn_unix_ms) = (applied.revision, unix_ms());
+                client.report_frame(FrameReport { revision, received_unix_ms, ready_unix_ms, drawn_unix_ms });
+                report::print_diagnostics(&applied.diagnostics, false);
+                let path = args.out.join(format!("revision_{revision:04}.png"));
+                viewer.render()?.save(&path).with_context(|| format!("writing {}", path.display()))?;
+                println!("{}", path.display());
+            }
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn unix_ms() -> f64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64() * 1e3
 }

@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn every_edit_finds_its_place_in_the_sample() {
-        let sample = SampleArgs { panorama_width: 16, sun_elevation: 38.0 };
+        let sample = SampleArgs { panorama_width: 16, sun_elevation: 38.0, sun_azimuth: 40.0 };
         let mut files: std::collections::BTreeMap<String, Vec<u8>> =
             kiln_sample::files(&init::options(&sample)).into_iter().collect();
         for edit in script(&sample).unwrap() {

@@ -24,7 +24,7 @@ impl Eyes {
     pub(super) fn open(size: [u32; 2]) -> Eyes {
         let (viewer, description) = match kiln_gpu::Gpu::headless() {
             Ok(gpu) => {
-                let description = format!("frames are drawn by {}", gpu.describe());
+                let description = format!("frames are drawn by {}", gpu.description());
                 (Some(kiln_preview::HeadlessViewer::new(gpu, size)), description)
             }
             Err(error) => (None, format!("no frames, only the artefacts: {error}")),

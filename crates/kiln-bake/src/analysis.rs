@@ -1,0 +1,127 @@
+//! Panorama → what all its lighting maps are made from.
+
+use crate::bright::{BrightTexel, take_brightest};
+use crate::patch::Patch;
+use kiln_image::Panorama;
+use kiln_sphere::{Harmonics, kernel_ggx};
+use std::f64::consts::PI;
+
+/// Highest band limit [`analyse`] chooses: GGX of α = 1/256 to 1e-4. Beyond it memory, not time, is the limit
+/// (counted: about 0.9 GB while a map of all its degrees is made).
+pub const BAND_LIMIT_MAX: usize = 2047;
+/// Most texels that are convolved directly.
+pub const BRIGHT_MAX: usize = 64;
+/// Degrees kept of the whole environment, bright texels included, for [`crate::sh`].
+pub(crate) const LOW_BAND_LIMIT: usize = 8;
+
+/// What an analysis must be good for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AnalysisRequest {
+    /// Smallest GGX α that will be asked for; (0, 1].
+    pub alpha_min: f64,
+    /// Relative RMS error each prefiltered map may have from the transform, encoding not counted.
+    pub error: f64,
+}
+
+/// An environment's harmonics up to a band limit, its brightest texels apart.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Analysis {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) error: f64,
+    /// Harmonics of the environment without the excess of the bright texels.
+    pub(crate) dim: Harmonics,
+    /// ∫ |dim|² dω, all degrees, summed over the channels.
+    pub(crate) dim_energy: f64,
+    pub(crate) bright: Vec<BrightTexel>,
+    /// Harmonics of the whole environment, degrees up to 8.
+    pub(crate) low: Harmonics,
+    /// Least and greatest texel per channel.
+    pub(crate) range: [[f64; 2]; 3],
+}
+
+/// Analyses a panorama of finite, not negative texels, of any 2:1 size.
+///
+/// The band limit follows the error asked for: with V the variance of the dim part over the sphere, the smallest L
+/// with max_{l > L} |κ_l| √V ≤ error/2 · mean, κ the spectrum of `alpha_min`; at most [`BAND_LIMIT_MAX`]. What is
+/// reached is stated by each map ([`crate::Accuracy`]).
+pub fn analyse(panorama: &Panorama, request: &AnalysisRequest) -> Analysis {
+    let (width, height) = (panorama.width(), panorama.height());
+    let low = kiln_sphere::analyse(width, height, panorama.rgb(), LOW_BAND_LIMIT);
+    let mut rgb = panorama.rgb().to_vec();
+    let bright = take_brightest(&mut rgb, low.mean(), BRIGHT_MAX);
+    let dim_energy = energy(width, height, &rgb);
+    let variance = variance_of_rest(low.mean(), dim_energy, width, height, &bright);
+    let band_limit = choose_band_limit(request, low.mean(), variance);
+    let dim = kiln_sphere::analyse(width, height, &rgb, band_limit);
+    Analysis {
+        width,
+        height,
+        error: request.error,
+        dim,
+        dim_energy,
+        bright,
+        low,
+        range: range(panorama.rgb()),
+    }
+}
+
+impl Analysis {
+    /// Highest degree known.
+    pub fn band_limit(&self) -> usize {
+        self.dim.band_limit()
+    }
+
+    /// Mean radiance over the sphere, per channel.
+    pub fn mean(&self) -> [f64; 3] {
+        self.low.mean()
+    }
+}
+
+/// Mean of |dim − its mean|² over the sphere, summed over the channels.
+fn variance_of_rest(
+    mean: [f64; 3],
+    dim_energy: f64,
+    width: usize,
+    height: usize,
+    bright: &[BrightTexel],
+) -> f64 {
+    let mut dim_mean = mean;
+    for texel in bright {
+        let share = Patch::of_texel(width, height, texel.index).solid_angle_sr() / (4.0 * PI);
+        for (mean, excess) in dim_mean.iter_mut().zip(texel.excess) {
+            *mean -= share * excess;
+        }
+    }
+    (dim_energy / (4.0 * PI) - square(dim_mean)).max(0.0)
+}
+
+fn square(rgb: [f64; 3]) -> f64 {
+    rgb.iter().map(|value| value * value).sum()
+}
+
+pub(crate) fn choose_band_limit(request: &AnalysisRequest, mean: [f64; 3], variance: f64) -> usize {
+    if variance <= 0.0 {
+        return LOW_BAND_LIMIT;
+    }
+    let allowed = 0.5 * request.error * (square(mean) / variance).sqrt();
+    let kappa = kernel_ggx(crate::prefilter::usable_alpha(request.alpha_min), BAND_LIMIT_MAX).kappa;
+    let last_needed = kappa.iter().rposition(|k| k.abs() > allowed || allowed.is_nan()).unwrap_or(0);
+    last_needed.max(LOW_BAND_LIMIT)
+}
+
+/// ∫ |f|² dω of constant patches, summed over the channels.
+fn energy(width: usize, height: usize, rgb: &[f32]) -> f64 {
+    let row_energy = |(row, texels): (usize, &[f32])| {
+        let solid_angle_sr = Patch::of_texel(width, height, row * width).solid_angle_sr();
+        solid_angle_sr * texels.iter().map(|&value| f64::from(value) * f64::from(value)).sum::<f64>()
+    };
+    rgb.chunks_exact(width * 3).enumerate().map(row_energy).sum()
+}
+
+fn range(rgb: &[f32]) -> [[f64; 2]; 3] {
+    std::array::from_fn(|channel| {
+        let values = rgb.iter().skip(channel).step_by(3).map(|&value| f64::from(value));
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+    })
+}

@@ -1,0 +1,37 @@
+//! Recipes of image-based lighting: an environment and a quality in, maps with their error out.
+//!
+//! Start at [`analyse`], which turns a panorama into an [`Analysis`] once; [`specular_level`], [`irradiance`]
+//! and [`sh`] read it. [`skybox`] and [`dfg_table`] need no analysis. [`encode_level`] makes texel bytes.
+//!
+//! A prefiltered map is the environment convolved with its lobe (N = V = R), done on spherical harmonics with
+//! texels as constant patches; the brightest texels are convolved directly, so a sun cannot ring. There are no
+//! samples and therefore no noise. Every map states a bound of its own error.
+//!
+//! Conventions: those of `kiln-sphere` (right-handed, +Y up, KTX2 cubes); linear relative radiance; irradiance
+//! maps hold E/π; `f64` inside, `f32` in results. Panoramas are expected to be finite and not negative:
+//! `kiln_image` checks and repairs texels. Equal inputs give equal bytes for any number of threads.
+//!
+//! Not here: image files and containers (`kiln-image`), when to bake what (`kiln-daemon`), sampled estimators
+//! (`kiln-sample`).
+
+mod analysis;
+mod bright;
+mod bytes;
+mod encode;
+mod patch;
+mod prefilter;
+mod reference;
+mod sh;
+mod skybox;
+mod tables;
+#[cfg(test)]
+mod tests;
+
+pub use analysis::{Analysis, AnalysisRequest, BAND_LIMIT_MAX, BRIGHT_MAX, analyse};
+pub use bytes::BakeError;
+pub use encode::{EncodedLevel, TexelFormat, encode_level, scale_log2};
+pub use prefilter::{ALPHA_MIN, Accuracy, Prefiltered, irradiance, specular_level};
+pub use reference::reference_radiance;
+pub use sh::{ShCoefficients, irradiance_sh, sh};
+pub use skybox::skybox;
+pub use tables::{dfg_table, roughness_of_level};

@@ -1,0 +1,166 @@
+//! Prefiltered cube maps: one multiplication per harmonic, one synthesis, the bright texels on top.
+
+use crate::analysis::Analysis;
+use crate::bright::BrightSet;
+use kiln_image::Cube;
+use kiln_sphere::direction::cube_texel_centre;
+use kiln_sphere::{
+    Kernel, cube_direction, cube_texel_solid_angle_sr, kernel_ggx, kernel_lambert, synthesise_cube,
+};
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// Smallest α that is told apart from 0.
+pub const ALPHA_MIN: f64 = 1e-4;
+
+/// A map and how well it is known.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prefiltered {
+    /// Values at texel centres.
+    pub cube: Cube,
+    /// Bounds of its error.
+    pub accuracy: Accuracy,
+}
+
+/// Bounds of a map's error against the exact convolution of the panorama's constant patches, and its clamping.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Accuracy {
+    /// Bound of the RMS error over the sphere and the channels, relative to the RMS (same sense) of the exact map.
+    pub rms_bound: f64,
+    /// Bound of the error in any direction (Euclidean over the channels), relative to the mean radiance (same norm).
+    pub sup_bound: f64,
+    /// Flux that clamping to the environment's range added or removed, relative to the map's flux.
+    pub clamped_flux: f64,
+    /// Highest degree the transform used.
+    pub band_limit: usize,
+}
+
+/// The environment convolved with the GGX lobe of N = V = R, for one mip level.
+///
+/// `alpha` = perceptual roughness², brought into [[`ALPHA_MIN`], 1]; for roughness 0 use [`crate::skybox`].
+/// `face_size` ≥ 1. As many degrees are used as the analysis' error asks for at this α.
+pub fn specular_level(analysis: &Analysis, alpha: f64, face_size: usize) -> Prefiltered {
+    let alpha = usable_alpha(alpha);
+    prefilter(analysis, &kernel_ggx(alpha, analysis.band_limit()), alpha, face_size)
+}
+
+/// The environment's irradiance over π, E/π: convolved with max(cos θ, 0)/π, which is GGX of α = 1.
+pub fn irradiance(analysis: &Analysis, face_size: usize) -> Prefiltered {
+    prefilter(analysis, &kernel_lambert(analysis.band_limit()), 1.0, face_size)
+}
+
+pub(crate) fn usable_alpha(alpha: f64) -> f64 {
+    if alpha >= ALPHA_MIN { alpha.min(1.0) } else { ALPHA_MIN }
+}
+
+fn prefilter(analysis: &Analysis, kernel: &Kernel, alpha: f64, face_size: usize) -> Prefiltered {
+    let truncation = Truncation::choose(analysis, kernel);
+    let kappa = &kernel.kappa[..=truncation.band_limit];
+    let mut rgb = synthesise_cube(&analysis.dim, kappa, face_size);
+    add_bright(analysis, alpha, libm::exp(-kernel.ln_norm), face_size, &mut rgb);
+    let clamped_flux = clamp(analysis, face_size, &mut rgb);
+    let largest = rgb.chunks_exact(3).map(norm).fold(0.0, f64::max);
+    let cube = Cube { face_size, rgb: rgb.iter().map(|&value| value as f32).collect() };
+    Prefiltered { cube, accuracy: truncation.accuracy(largest, clamped_flux) }
+}
+
+/// Adds the bright texels' share, Σ excess ∫_patch K dω / ∫ K dω.
+fn add_bright(analysis: &Analysis, alpha: f64, inverse_norm: f64, face_size: usize, rgb: &mut [f64]) {
+    let bright = BrightSet::new(analysis.width, analysis.height, &analysis.bright);
+    if bright.is_empty() {
+        return;
+    }
+    rgb.par_chunks_mut(face_size * 3).enumerate().for_each(|(line, texels)| {
+        let t = cube_texel_centre(face_size, line % face_size);
+        for (x, texel) in texels.chunks_exact_mut(3).enumerate() {
+            let axis = cube_direction(line / face_size, cube_texel_centre(face_size, x), t);
+            for (value, share) in texel.iter_mut().zip(bright.convolve_ggx(alpha, axis)) {
+                *value += share * inverse_norm;
+            }
+        }
+    });
+}
+
+/// Brings values into the environment's range; returns the flux moved relative to all flux.
+fn clamp(analysis: &Analysis, face_size: usize, rgb: &mut [f64]) -> f64 {
+    let (mut moved, mut total) = (0.0, 0.0);
+    for (index, texel) in rgb.chunks_exact_mut(3).enumerate() {
+        let (x, y) = (index % face_size, index / face_size % face_size);
+        let (mut texel_moved, mut texel_total) = (0.0, 0.0);
+        for (value, [low, high]) in texel.iter_mut().zip(analysis.range) {
+            let inside = value.max(low).min(high);
+            texel_moved += (inside - *value).abs();
+            texel_total += inside.abs();
+            *value = inside;
+        }
+        let solid_angle_sr = cube_texel_solid_angle_sr(face_size, x, y);
+        moved += solid_angle_sr * texel_moved;
+        total += solid_angle_sr * texel_total;
+    }
+    if total > 0.0 { moved / total } else { 0.0 }
+}
+
+/// Relative error of evaluation apart from truncation: the window of the synthesis, the bright texels' rules (1e-7
+/// each) and rounding to `f32`. Measured, not proved.
+const EVALUATION_ERROR: f64 = 3e-7;
+
+/// How many degrees a map takes and what the others could have added.
+struct Truncation {
+    band_limit: usize,
+    /// Bound of ∫ |error|² dω.
+    energy: f64,
+    /// Bound of |error| in any direction.
+    sup: f64,
+    /// Lower bound of ∫ |map|² dω.
+    map_energy: f64,
+    /// Euclidean norm of the mean radiance.
+    mean: f64,
+}
+
+impl Truncation {
+    /// The fewest degrees that leave a quarter of the error asked for.
+    fn choose(analysis: &Analysis, kernel: &Kernel) -> Self {
+        let energies = analysis.dim.band_energies();
+        let last = energies.len() - 1;
+        let map_energy = scaled_energy(&kernel.kappa, &analysis.low.band_energies());
+        // By Parseval what the known degrees do not hold is beyond them; rounding leaves 1e-13 of the whole.
+        let unknown = (analysis.dim_energy - energies.iter().sum::<f64>()).max(1e-13 * analysis.dim_energy);
+        let tail = kernel.energy_beyond(last);
+        // κ_l² (2l + 1)/4π ≤ tail for each l beyond.
+        let mut energy = unknown * tail * 4.0 * PI / (2 * last + 3) as f64;
+        let mut sup = (unknown * tail).sqrt();
+        let allowed = (0.25 * analysis.error).powi(2) * map_energy;
+        let mut band_limit = last;
+        while band_limit > 0 {
+            let (kappa, band) = (kernel.kappa[band_limit], energies[band_limit]);
+            let more = energy + kappa * kappa * band;
+            if more > allowed || more.is_nan() {
+                break;
+            }
+            energy = more;
+            sup += kappa.abs() * ((2 * band_limit + 1) as f64 * band / (4.0 * PI)).sqrt();
+            band_limit -= 1;
+        }
+        Self { band_limit, energy, sup, map_energy, mean: norm(&analysis.mean()) }
+    }
+
+    /// `largest`: norm of the map's brightest texel, which evaluation errors are relative to.
+    fn accuracy(&self, largest: f64, clamped_flux: f64) -> Accuracy {
+        let relative = |error: f64, size: f64| if size > 0.0 { error / size } else { 0.0 };
+        Accuracy {
+            rms_bound: relative(self.energy.sqrt(), self.map_energy.sqrt()) + EVALUATION_ERROR,
+            sup_bound: relative(self.sup + EVALUATION_ERROR * largest, self.mean),
+            clamped_flux,
+            band_limit: self.band_limit,
+        }
+    }
+}
+
+fn norm(rgb: &[f64]) -> f64 {
+    rgb.iter().map(|value| value * value).sum::<f64>().sqrt()
+}
+
+/// Σ_l κ_l² ‖f_l‖².
+fn scaled_energy(kappa: &[f64], energies: &[f64]) -> f64 {
+    kappa.iter().zip(energies).map(|(k, energy)| k * k * energy).sum()
+}

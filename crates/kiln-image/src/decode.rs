@@ -1,0 +1,155 @@
+//! The one entry: sniffs the content, checks the limits, hands over to a format.
+
+use crate::{Image, LayoutError, hdr, ldr, openexr};
+use thiserror::Error;
+
+/// What came out of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Decoded {
+    /// Linear Rec. 709 D65, relative radiance, upright.
+    pub image: Image,
+    /// `"Radiance HDR"`, `"OpenEXR"`, `"PNG"` or `"JPEG"`.
+    pub format: &'static str,
+    /// What a person should know: conversions made, parts chosen, attributes without effect.
+    pub notes: Vec<String>,
+}
+
+/// The largest image that is accepted; checked against headers before anything is allocated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Columns.
+    pub width_max: usize,
+    /// Rows.
+    pub height_max: usize,
+    /// Columns times rows.
+    pub texels_max: usize,
+    /// Channels of one EXR part.
+    pub channels_max: usize,
+    /// Parts of one EXR file.
+    pub parts_max: usize,
+}
+
+impl Default for Limits {
+    /// 16384 × 8192 texels, 1.5 GiB once decoded.
+    fn default() -> Limits {
+        Limits { width_max: 32768, height_max: 32768, texels_max: 1 << 27, channels_max: 256, parts_max: 256 }
+    }
+}
+
+/// Why bytes are no image.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum DecodeError {
+    /// No signature that is known.
+    #[error("neither Radiance HDR, OpenEXR, PNG nor JPEG: the file starts with {start:?}")]
+    UnknownFormat {
+        /// The first bytes, printable ones as they are.
+        start: String,
+    },
+    /// The bytes end too early.
+    #[error("{format}: the file ends in {what}, at byte {byte}")]
+    Truncated {
+        /// Format name as in [`Decoded::format`].
+        format: &'static str,
+        /// What is missing, with its row where there is one.
+        what: String,
+        /// Where the bytes end.
+        byte: usize,
+    },
+    /// The bytes contradict the format.
+    #[error("{format}: {place}: {reason}")]
+    Invalid {
+        /// Format name as in [`Decoded::format`].
+        format: &'static str,
+        /// Line, row or part.
+        place: String,
+        /// What is wrong there.
+        reason: String,
+    },
+    /// Well-formed, but nothing this crate reads.
+    #[error("{format}: {reason}")]
+    Unsupported {
+        /// Format name as in [`Decoded::format`].
+        format: &'static str,
+        /// What it is.
+        reason: String,
+    },
+    /// Over a limit of [`Limits`].
+    #[error("{format}: {what} is {actual}, over the limit of {limit}")]
+    TooLarge {
+        /// Format name as in [`Decoded::format`].
+        format: &'static str,
+        /// Which quantity.
+        what: &'static str,
+        /// Its value in the file.
+        actual: u64,
+        /// The limit.
+        limit: u64,
+    },
+    /// A size that makes no image.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
+}
+
+/// Decodes a file by its content; names and extensions do not matter.
+///
+/// # Errors
+/// [`DecodeError`], for anything but a whole image within `limits`. Nothing panics on hostile bytes and
+/// nothing larger than the limits is allocated.
+pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Decoded, DecodeError> {
+    match bytes {
+        [b'#', b'?', ..] => hdr::decode(bytes, limits),
+        [0x76, 0x2f, 0x31, 0x01, ..] => openexr::decode(bytes, limits),
+        [0x89, b'P', b'N', b'G', ..] => ldr::decode(bytes, ldr::Kind::Png, limits),
+        [0xff, 0xd8, 0xff, ..] => ldr::decode(bytes, ldr::Kind::Jpeg, limits),
+        _ => Err(DecodeError::UnknownFormat { start: printable_start(bytes) }),
+    }
+}
+
+/// Refuses sizes of zero or over the limits.
+pub(crate) fn check_size(
+    format: &'static str,
+    width: usize,
+    height: usize,
+    limits: &Limits,
+) -> Result<(), DecodeError> {
+    if width == 0 || height == 0 {
+        return Err(LayoutError::Empty { width, height }.into());
+    }
+    let texels = width.saturating_mul(height);
+    let sizes = [
+        ("the width", width, limits.width_max),
+        ("the height", height, limits.height_max),
+        ("the number of texels", texels, limits.texels_max),
+    ];
+    match sizes.into_iter().find(|(_, actual, limit)| actual > limit) {
+        Some((what, actual, limit)) => Err(too_large(format, what, actual, limit)),
+        None => Ok(()),
+    }
+}
+
+pub(crate) fn too_large(
+    format: &'static str,
+    what: &'static str,
+    actual: usize,
+    limit: usize,
+) -> DecodeError {
+    DecodeError::TooLarge { format, what, actual: actual as u64, limit: limit as u64 }
+}
+
+/// Runs a foreign decoder; its panic becomes an error of this file.
+///
+/// The decoders behind this are other people's: a panic in one is a bug there, but the bytes that
+/// trigger it are a user's file, and a daemon must outlive them. Nothing of `run` survives the unwind.
+pub(crate) fn guard<T>(
+    format: &'static str,
+    run: impl FnOnce() -> Result<T, DecodeError>,
+) -> Result<T, DecodeError> {
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)).unwrap_or_else(|_| {
+        let reason = "the decoder gave up on damaged data".to_owned();
+        Err(DecodeError::Invalid { format, place: "file".to_owned(), reason })
+    })
+}
+
+fn printable_start(bytes: &[u8]) -> String {
+    bytes.iter().take(12).flat_map(|&byte| std::ascii::escape_default(byte)).map(char::from).collect()
+}

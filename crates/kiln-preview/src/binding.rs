@@ -1,0 +1,118 @@
+//! Bind groups, filled by name.
+
+use kiln_gpu::Gpu;
+use kiln_scene::Material;
+use wgpu::util::{BufferInitDescriptor, DeviceExt as _};
+
+use crate::prepare::Environment;
+use crate::program::{Bound, Program};
+use crate::scene_gpu::GpuScene;
+use crate::slot::Slot;
+use crate::uniform::{FrameValues, fill_block, material_member};
+
+/// Group 0 of one program: its bind group, and the buffer that each frame writes.
+#[derive(Debug)]
+pub(crate) struct FrameBinding {
+    pub group: Option<wgpu::BindGroup>,
+    block: Option<(wgpu::Buffer, Bound)>,
+}
+
+impl FrameBinding {
+    /// Binds the environment, and for tonemaps the picture they read.
+    pub fn new(
+        gpu: &Gpu,
+        program: &Program,
+        environment: &Environment,
+        hdr_color: Option<&wgpu::TextureView>,
+    ) -> Self {
+        let frame = program.groups[0].iter().find(|bound| bound.slot == Slot::Frame);
+        let block = frame.map(|bound| (uniform_buffer(gpu, bound, Vec::new()), bound.clone()));
+        let resource = |bound: &Bound| {
+            let view = match bound.slot {
+                Slot::Frame => return block.as_ref().map(|(buffer, _)| buffer.as_entire_binding()),
+                Slot::EnvSampler | Slot::LutSampler => {
+                    return Some(wgpu::BindingResource::Sampler(&environment.sampler));
+                }
+                Slot::EnvSkybox => Some(&environment.skybox.view),
+                Slot::EnvIrradiance => Some(&environment.irradiance.view),
+                Slot::EnvSpecular => Some(&environment.specular.view),
+                Slot::LutGgx => Some(&environment.lut_ggx.view),
+                Slot::HdrColor => hdr_color,
+                _ => None,
+            };
+            view.map(wgpu::BindingResource::TextureView)
+        };
+        let group = create_group(gpu, program, 0, resource);
+        FrameBinding { group, block }
+    }
+
+    /// Whether pictures change with time.
+    pub fn reads_time(&self) -> bool {
+        self.block.as_ref().is_some_and(|(_, bound)| bound.reads_time())
+    }
+
+    /// Writes this frame's values.
+    pub fn write(&self, gpu: &Gpu, values: &FrameValues) {
+        if let Some((buffer, Bound { block: Some((size_bytes, members)), .. })) = &self.block {
+            gpu.queue.write_buffer(buffer, 0, &fill_block(*size_bytes, members, |name| values.member(name)));
+        }
+    }
+}
+
+/// Group 1: a material as one program reads it.
+pub(crate) fn material_group(
+    gpu: &Gpu,
+    program: &Program,
+    scene: &GpuScene,
+    material: &Material,
+) -> Option<wgpu::BindGroup> {
+    let uniform = program.groups[1].iter().find(|bound| bound.slot == Slot::Material);
+    let buffer = uniform.map(|bound| {
+        let (size_bytes, members) =
+            bound.block.as_ref().map_or((0, &[][..]), |(size, members)| (*size, members));
+        uniform_buffer(gpu, bound, fill_block(size_bytes, members, |name| material_member(material, name)))
+    });
+    create_group(gpu, program, 1, |bound| match bound.slot {
+        Slot::Material => buffer.as_ref().map(wgpu::Buffer::as_entire_binding),
+        Slot::MaterialTexture(map) => {
+            Some(wgpu::BindingResource::TextureView(scene.texture(material, map).0))
+        }
+        Slot::MaterialSampler(map) => Some(wgpu::BindingResource::Sampler(scene.texture(material, map).1)),
+        _ => None,
+    })
+}
+
+/// Group 2: one buffer for all draws of a program, read at a dynamic offset.
+pub(crate) fn draw_group(gpu: &Gpu, program: &Program, blocks: &[u8]) -> Option<wgpu::BindGroup> {
+    let bound = program.groups[2].first()?;
+    let size = bound.block.as_ref().map_or(0, |(size, _)| u64::from(*size));
+    let buffer = uniform_buffer(gpu, bound, blocks.to_vec());
+    create_group(gpu, program, 2, |_| {
+        let binding = wgpu::BufferBinding { buffer: &buffer, offset: 0, size: size.try_into().ok() };
+        Some(wgpu::BindingResource::Buffer(binding))
+    })
+}
+
+/// A uniform buffer that holds `contents`, and at least the block's size.
+fn uniform_buffer(gpu: &Gpu, bound: &Bound, mut contents: Vec<u8>) -> wgpu::Buffer {
+    let size = bound.block.as_ref().map_or(0, |(size, _)| *size as usize);
+    contents.resize(contents.len().max(size), 0);
+    gpu.device.create_buffer_init(&BufferInitDescriptor {
+        label: Some("uniform"),
+        contents: &contents,
+        usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+    })
+}
+
+fn create_group<'a>(
+    gpu: &Gpu,
+    program: &'a Program,
+    group: usize,
+    resource: impl Fn(&Bound) -> Option<wgpu::BindingResource<'a>>,
+) -> Option<wgpu::BindGroup> {
+    let layout = program.layouts[group].as_ref()?;
+    let entry =
+        |bound: &Bound| Some(wgpu::BindGroupEntry { binding: bound.binding, resource: resource(bound)? });
+    let entries: Vec<_> = program.groups[group].iter().filter_map(entry).collect();
+    Some(gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries }))
+}

@@ -1,0 +1,161 @@
+//! The camera: around a point, set by the hand or by the file.
+
+use std::f32::consts::{FRAC_PI_2, PI, TAU};
+
+use glam::camera::rh::proj::directx::perspective;
+use glam::camera::rh::view::look_at_mat4;
+use glam::{Mat4, Vec3};
+use kiln_scene::{Bounds, Camera, Scene};
+
+/// Vertical field of view where no camera of the file says another: a short telephoto, as for products.
+const FIELD_OF_VIEW_RAD: f32 = 35.0 * PI / 180.0;
+/// Pitch stops short of the poles, where "up" is not defined.
+const PITCH_MAX_RAD: f32 = FRAC_PI_2 - 0.01;
+/// Room left around the scene, as a factor of the distance at which it just fits.
+const FRAME_MARGIN: f32 = 1.06;
+
+/// Looks at a point from a direction and a distance; +Y is up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OrbitCamera {
+    /// What it looks at.
+    pub target: Vec3,
+    /// From the target to the eye, above 0.
+    pub distance: f32,
+    /// Angle of the eye around +Y; 0 is towards +Z, growing towards +X.
+    pub yaw_rad: f32,
+    /// Angle of the eye above the horizon.
+    pub pitch_rad: f32,
+    /// Vertical field of view.
+    pub field_of_view_rad: f32,
+}
+
+impl OrbitCamera {
+    /// Where there is no scene: level, from the origin's front.
+    pub(crate) const BACKGROUND_ONLY: OrbitCamera = OrbitCamera {
+        target: Vec3::ZERO,
+        distance: 1.0,
+        yaw_rad: 0.0,
+        pitch_rad: 0.0,
+        field_of_view_rad: FIELD_OF_VIEW_RAD,
+    };
+
+    /// The first perspective camera of the file (its roll is not kept), else one that shows the whole scene from
+    /// slightly above and beside its front. `aspect` = width / height.
+    pub fn for_scene(scene: &Scene, aspect: f32) -> Self {
+        let bounds = scene.bounds.unwrap_or(Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE });
+        let of_file = scene.cameras.iter().find_map(|camera| Self::from_file(camera, bounds));
+        of_file.unwrap_or_else(|| Self::framing(bounds, aspect))
+    }
+
+    fn from_file(camera: &Camera, bounds: Bounds) -> Option<Self> {
+        let field_of_view_rad = camera.yfov_rad.filter(|angle| (0.01..3.1).contains(angle))?;
+        let eye = camera.world.w_axis.truncate();
+        let forward = (-camera.world.z_axis.truncate()).try_normalize()?;
+        let along = (center(bounds) - eye).dot(forward);
+        // Turning around a point in the middle of the scene feels right; one behind the eye would not.
+        let distance = if along > 0.0 { along } else { diagonal(bounds) };
+        let camera = OrbitCamera {
+            target: eye + forward * distance,
+            distance,
+            yaw_rad: (-forward.x).atan2(-forward.z),
+            pitch_rad: (-forward.y).clamp(-1.0, 1.0).asin().clamp(-PITCH_MAX_RAD, PITCH_MAX_RAD),
+            field_of_view_rad,
+        };
+        (camera.target.is_finite() && distance.is_finite() && distance > 0.0).then_some(camera)
+    }
+
+    /// Shows the whole box from slightly above and beside its front.
+    pub fn framing(bounds: Bounds, aspect: f32) -> Self {
+        let mut camera = OrbitCamera {
+            target: center(bounds),
+            distance: 1.0,
+            yaw_rad: 0.5,
+            pitch_rad: 0.25,
+            field_of_view_rad: FIELD_OF_VIEW_RAD,
+        };
+        camera.distance = camera.fitting_distance(bounds, aspect).max(1e-4) * FRAME_MARGIN;
+        camera
+    }
+
+    /// The distance at which every corner of the box is just inside the picture.
+    fn fitting_distance(&self, bounds: Bounds, aspect: f32) -> f32 {
+        let half_height = (self.field_of_view_rad / 2.0).tan();
+        let half_width = half_height * aspect.clamp(1e-3, 1e3);
+        let (right, up, back) = self.axes();
+        let needed = corners(bounds).map(|corner| {
+            let offset = corner - self.target;
+            let sideways = (offset.dot(right).abs() / half_width).max(offset.dot(up).abs() / half_height);
+            sideways + offset.dot(back)
+        });
+        needed.into_iter().filter(|distance| distance.is_finite()).fold(0.0, f32::max)
+    }
+
+    /// Right, up and backward, unit length.
+    fn axes(&self) -> (Vec3, Vec3, Vec3) {
+        let (sin_yaw, cos_yaw) = self.yaw_rad.sin_cos();
+        let (sin_pitch, cos_pitch) = self.pitch_rad.sin_cos();
+        let back = Vec3::new(sin_yaw * cos_pitch, sin_pitch, cos_yaw * cos_pitch);
+        let right = Vec3::new(cos_yaw, 0.0, -sin_yaw);
+        (right, back.cross(right), back)
+    }
+
+    /// Where the eye is.
+    pub fn position(&self) -> Vec3 {
+        self.target + self.axes().2 * self.distance
+    }
+
+    /// World to clip space, depth 0 at the near plane; the planes are as tight around `bounds` as the eye allows.
+    pub fn clip_from_world(&self, bounds: Option<Bounds>, aspect: f32) -> Mat4 {
+        let (near, far) = self.depth_range(bounds);
+        let view = look_at_mat4(self.position(), self.target, Vec3::Y);
+        perspective(self.field_of_view_rad, aspect, near, far) * view
+    }
+
+    fn depth_range(&self, bounds: Option<Bounds>) -> (f32, f32) {
+        let Some(bounds) = bounds else { return (self.distance * 0.01, self.distance * 100.0) };
+        let (eye, back) = (self.position(), self.axes().2);
+        let depths = corners(bounds).map(|corner| (eye - corner).dot(back));
+        let nearest = depths.into_iter().fold(f32::INFINITY, f32::min);
+        let farthest = depths.into_iter().fold(0.0, f32::max).max(self.distance);
+        // A ratio of 10⁴ keeps 32-bit depth far from fighting.
+        let near = (nearest * 0.99).max(farthest * 1e-4);
+        (near, (farthest * 1.01).max(near * 1.1))
+    }
+
+    /// Turns around the target.
+    pub fn orbit(&mut self, yaw_rad: f32, pitch_rad: f32) {
+        self.yaw_rad = (self.yaw_rad + yaw_rad).rem_euclid(TAU);
+        self.pitch_rad = (self.pitch_rad + pitch_rad).clamp(-PITCH_MAX_RAD, PITCH_MAX_RAD);
+    }
+
+    /// Moves target and eye sideways by fractions of the picture's height.
+    pub fn pan(&mut self, right: f32, up: f32) {
+        let height = 2.0 * self.distance * (self.field_of_view_rad / 2.0).tan();
+        let (right_axis, up_axis, _) = self.axes();
+        self.target += (right_axis * right + up_axis * up) * height;
+    }
+
+    /// Multiplies the distance.
+    pub fn dolly(&mut self, factor: f32) {
+        self.distance = (self.distance * factor).clamp(1e-5, 1e7);
+    }
+}
+
+fn center(bounds: Bounds) -> Vec3 {
+    (bounds.min + bounds.max) / 2.0
+}
+
+fn diagonal(bounds: Bounds) -> f32 {
+    (bounds.max - bounds.min).length()
+}
+
+fn corners(bounds: Bounds) -> [Vec3; 8] {
+    std::array::from_fn(|corner| {
+        let pick = |bit: usize, min: f32, max: f32| if corner & bit == 0 { min } else { max };
+        Vec3::new(
+            pick(1, bounds.min.x, bounds.max.x),
+            pick(2, bounds.min.y, bounds.max.y),
+            pick(4, bounds.min.z, bounds.max.z),
+        )
+    })
+}

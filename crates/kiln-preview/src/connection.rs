@@ -1,0 +1,96 @@
+//! The thread that talks to the daemon and wakes the window.
+
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use kiln_link::{Client, ClientEvent, FrameReport};
+
+use crate::worker::unix_ms;
+
+/// How often a finished frame is looked for while the daemon waits for one; its times are taken elsewhere.
+const REPORT_POLL: Duration = Duration::from_millis(20);
+/// How often the thread looks whether the window is gone.
+const IDLE_POLL: Duration = Duration::from_millis(250);
+
+/// Something from the daemon, with when it came.
+#[derive(Debug)]
+pub(crate) struct Heard {
+    pub event: ClientEvent,
+    pub unix_ms: f64,
+}
+
+/// Both directions of the talk, as the window sees them.
+#[derive(Debug)]
+pub(crate) struct Connection {
+    heard: Receiver<Heard>,
+    reports: Option<Sender<FrameReport>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Connection {
+    /// Connects; `wake` is called whenever [`Connection::next`] has something new.
+    pub fn open(socket: PathBuf, wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
+        let (sender, heard) = channel();
+        let (reports, reported) = channel();
+        let thread = std::thread::Builder::new().name("link".into());
+        let thread = thread.spawn(move || {
+            forward(&Client::connect(socket, "preview, window"), &sender, &reported, wake);
+        })?;
+        Ok(Connection { heard, reports: Some(reports), thread: Some(thread) })
+    }
+
+    /// The oldest event not yet taken.
+    pub fn next(&self) -> Option<Heard> {
+        self.heard.try_recv().ok()
+    }
+
+    /// Where finished frames are reported.
+    pub fn reports(&self) -> Option<Sender<FrameReport>> {
+        self.reports.clone()
+    }
+}
+
+impl Drop for Connection {
+    fn drop(&mut self) {
+        drop(self.reports.take());
+        if let Some(thread) = self.thread.take() {
+            // It has nothing to return.
+            drop(thread.join());
+        }
+    }
+}
+
+/// Passes events on and reports back until the window is gone. The client's receiver cannot be shared between
+/// threads, so one thread serves both directions, and polls for reports only while one is due.
+fn forward(client: &Client, heard: &Sender<Heard>, reported: &Receiver<FrameReport>, wake: impl Fn()) {
+    let mut newest_sent = 0;
+    let mut newest_reported = 0;
+    loop {
+        let poll = if newest_sent > newest_reported { REPORT_POLL } else { IDLE_POLL };
+        match client.events().recv_timeout(poll) {
+            Ok(event) => {
+                if let ClientEvent::Revision(revision) = &event {
+                    newest_sent = revision.table.number;
+                }
+                if heard.send(Heard { event, unix_ms: unix_ms() }).is_err() {
+                    return;
+                }
+                wake();
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => return,
+        }
+        loop {
+            match reported.try_recv() {
+                Ok(report) => {
+                    newest_reported = report.revision;
+                    client.report_frame(report);
+                }
+                Err(TryRecvError::Empty) => break,
+                Err(TryRecvError::Disconnected) => return,
+            }
+        }
+    }
+}

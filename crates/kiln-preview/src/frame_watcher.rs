@@ -1,0 +1,76 @@
+//! When the device finished the first frame of a revision: what the user calls latency.
+
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::Duration;
+
+use anyhow::Context as _;
+use kiln_gpu::Gpu;
+use kiln_link::FrameReport;
+
+use crate::worker::{Ready, unix_ms};
+
+/// How long a frame may take before nobody waits for it any more.
+const FRAME_TIMEOUT: Duration = Duration::from_secs(20);
+
+/// A frame whose end the daemon wants to know.
+pub(crate) struct Watched {
+    pub submission: wgpu::SubmissionIndex,
+    pub ready: Ready,
+    pub noticed_unix_ms: f64,
+}
+
+/// Waits for frames on its own thread and reports when the device was done with them.
+pub(crate) struct FrameWatcher {
+    frames: Sender<Watched>,
+    latencies_ms: Receiver<f64>,
+}
+
+impl FrameWatcher {
+    /// Starts the thread; `wake` is called whenever [`FrameWatcher::latency_ms`] has something new.
+    pub fn spawn(
+        gpu: Gpu,
+        reports: Sender<FrameReport>,
+        wake: impl Fn() + Send + 'static,
+    ) -> anyhow::Result<Self> {
+        let (frames, watched) = channel::<Watched>();
+        let (sender, latencies_ms) = channel();
+        let thread = std::thread::Builder::new().name("frames".into());
+        let watch = move || {
+            for frame in watched {
+                let (report, latency_ms) = await_frame(&gpu, frame);
+                // Both ends belong to the window: when they are gone, so is the need.
+                if reports.send(report).is_err()
+                    || latency_ms.is_some_and(|latency_ms| sender.send(latency_ms).is_err())
+                {
+                    return;
+                }
+                wake();
+            }
+        };
+        thread.spawn(watch).context("starting a thread")?;
+        Ok(FrameWatcher { frames, latencies_ms })
+    }
+
+    /// Waits for `frame`.
+    pub fn watch(&self, frame: Watched) {
+        // The thread ends only with the window.
+        drop(self.frames.send(frame));
+    }
+
+    /// From noticing the change to the end of the newest frame that was waited for, once.
+    pub fn latency_ms(&self) -> Option<f64> {
+        self.latencies_ms.try_iter().last()
+    }
+}
+
+fn await_frame(gpu: &Gpu, frame: Watched) -> (FrameReport, Option<f64>) {
+    let wait =
+        wgpu::PollType::Wait { submission_index: Some(frame.submission), timeout: Some(FRAME_TIMEOUT) };
+    // A lost device shows in the panel; its frame counts as drawn now.
+    drop(gpu.device.poll(wait));
+    let drawn_unix_ms = unix_ms();
+    let Ready { prepared, received_unix_ms, ready_unix_ms } = frame.ready;
+    let revision = prepared.report.revision;
+    let latency_ms = (frame.noticed_unix_ms > 0.0).then_some(drawn_unix_ms - frame.noticed_unix_ms);
+    (FrameReport { revision, received_unix_ms, ready_unix_ms, drawn_unix_ms }, latency_ms)
+}

@@ -1,0 +1,94 @@
+//! Frames without a window.
+
+use std::sync::Arc;
+
+use image::RgbaImage;
+use kiln_gpu::{Gpu, GpuError};
+use kiln_link::Revision;
+
+use crate::prepare::Preparer;
+use crate::renderer::Renderer;
+use crate::report::ApplyReport;
+use crate::view::{Selection, View};
+
+/// Shows revisions in an offscreen picture; what the window does with threads, it does in order.
+#[derive(Debug)]
+pub struct HeadlessViewer {
+    /// How the picture is taken; change it freely between frames.
+    pub view: View,
+    gpu: Gpu,
+    selection: Selection,
+    revision: Option<Revision>,
+    preparer: Preparer,
+    renderer: Renderer,
+    report: ApplyReport,
+}
+
+impl HeadlessViewer {
+    /// A viewer that shows nothing yet. `size` is width and height in pixels.
+    pub fn new(gpu: Gpu, size: [u32; 2]) -> Self {
+        HeadlessViewer {
+            view: View::default(),
+            selection: Selection::default(),
+            revision: None,
+            preparer: Preparer::new(&gpu),
+            renderer: Renderer::new(&gpu, size),
+            report: ApplyReport::default(),
+            gpu,
+        }
+    }
+
+    /// Chooses what to show, of the last revision and of those to come.
+    pub fn select(&mut self, selection: Selection) -> ApplyReport {
+        self.selection = selection;
+        match self.revision.take() {
+            Some(revision) => self.apply(&revision),
+            None => self.report.clone(),
+        }
+    }
+
+    /// Shows a revision; returns when pipelines and uploads are done. What cannot be used keeps its last good form.
+    pub fn apply(&mut self, revision: &Revision) -> ApplyReport {
+        self.revision = Some(revision.clone());
+        if let Some(prepared) = self.preparer.prepare(revision, &self.selection) {
+            self.report = prepared.report.clone();
+            self.renderer.show(Arc::new(prepared));
+        }
+        self.gpu.queue.submit([]);
+        // A device that is lost shows when the picture is read.
+        drop(self.gpu.wait());
+        self.report.clone()
+    }
+
+    /// Changes the picture's size.
+    pub fn resize(&mut self, size: [u32; 2]) {
+        self.renderer.resize(size);
+    }
+
+    /// Draws a frame and waits until the device is done with it.
+    ///
+    /// # Errors
+    /// [`GpuError::Readback`] when the device is lost.
+    pub fn draw(&mut self) -> Result<(), GpuError> {
+        self.renderer.render(&self.view);
+        self.gpu.wait()
+    }
+
+    /// Draws a frame and reads it: sRGB-encoded, black before the first revision.
+    ///
+    /// # Errors
+    /// [`GpuError::Readback`] when the device is lost.
+    pub fn render(&mut self) -> Result<RgbaImage, GpuError> {
+        self.renderer.render(&self.view);
+        let output = self.renderer.output();
+        let (width, height) = (output.width(), output.height());
+        let bytes = self.gpu.read_texture(output, 0)?;
+        let truncated = || GpuError::Readback { reason: "the picture is incomplete".to_owned() };
+        RgbaImage::from_raw(width, height, bytes).ok_or_else(truncated)
+    }
+
+    /// The device it draws on.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+}

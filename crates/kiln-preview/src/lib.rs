@@ -1,0 +1,52 @@
+//! Shows a published scene: in a window with panels, or headless into pictures. A client like any other.
+//!
+//! Start at [`HeadlessViewer`]: revisions in, pictures out. [`run_window`] and [`run_headless`] put a connection to
+//! the daemon in front of it. In a window three threads work: one talks to the daemon, one prepares device
+//! resources for the newest revision, one draws what was prepared last; a revision that cannot be used never takes
+//! the picture away.
+//!
+//! Conventions: right-handed, +Y up; shaders are bound by name as `docs/shader-interface.md` says; radiance is
+//! linear until the tonemap shader, whose output is sRGB-encoded; depth 0 is near.
+//!
+//! Not here: compiling shaders (`kiln-shader`), baking maps (`kiln-bake`), reading glTF (`kiln-scene`), the device
+//! itself (`kiln-gpu`), the wire (`kiln-link`).
+
+#![expect(
+    clippy::result_large_err,
+    reason = "a diagnostic is made at most once for a target, never in a loop"
+)]
+
+pub use camera::OrbitCamera;
+pub use headless::HeadlessViewer;
+pub use report::ApplyReport;
+pub use run::{HeadlessOptions, HeadlessReport, run_headless};
+pub use view::{Selection, View};
+pub use window::{WindowOptions, run_window};
+
+mod binding;
+mod camera;
+mod connection;
+mod draw_list;
+mod frame_watcher;
+mod headless;
+mod keeper;
+mod live_picture;
+mod mip;
+mod neutral;
+mod panel;
+mod prepare;
+mod program;
+mod renderer;
+mod report;
+mod run;
+mod scene_gpu;
+mod slot;
+mod target;
+#[cfg(test)]
+mod tests;
+mod texture;
+mod theme;
+mod uniform;
+mod view;
+mod window;
+mod worker;

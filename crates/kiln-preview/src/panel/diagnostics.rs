@@ -1,0 +1,111 @@
+//! Diagnostics and badges over the picture, which goes on living below them.
+
+use egui::text::{LayoutJob, TextFormat};
+use egui::{Align2, Area, Id, Order, Rect, RichText, ScrollArea, Ui, vec2};
+use kiln_diagnostic::{Diagnostic, Severity, Span};
+
+use super::{Connection, PanelState};
+use crate::theme;
+
+/// Cards grow up to this part of the picture's height, then scroll.
+const HEIGHT_MAX: f32 = 0.45;
+/// Room between cards and the picture's edge.
+const MARGIN: f32 = 14.0;
+
+pub(super) fn show_over(ui: &Ui, place: Rect, state: &PanelState) {
+    show_status(ui, place, state);
+    if state.all_diagnostics().next().is_none() {
+        return;
+    }
+    let area = Area::new(Id::unique("kiln diagnostics")).order(Order::Middle).constrain_to(place);
+    let corner = place.left_bottom() + vec2(MARGIN, -MARGIN);
+    area.pivot(Align2::LEFT_BOTTOM).fixed_pos(corner).show(ui.ctx(), |ui| {
+        let worst = state.all_diagnostics().map(|diagnostic| diagnostic.severity).max();
+        theme::card_frame(color_of(worst.unwrap_or(Severity::Note))).show(ui, |ui| {
+            ui.set_max_width((place.width() - 4.0 * MARGIN).clamp(160.0, 760.0));
+            ScrollArea::both().max_height(place.height() * HEIGHT_MAX).show(ui, |ui| {
+                for (index, diagnostic) in state.all_diagnostics().enumerate() {
+                    if index > 0 {
+                        ui.separator();
+                    }
+                    show_diagnostic(ui, diagnostic);
+                }
+            });
+        });
+    });
+}
+
+/// What the picture itself is, where it is not what the sources say.
+fn show_status(ui: &Ui, place: Rect, state: &PanelState) {
+    let gone = matches!(state.connection, Connection::Gone { .. });
+    let (text, color) = if gone {
+        ("daemon gone, reconnecting: this is the last picture", theme::ERROR)
+    } else if !state.report.stale.is_empty() {
+        ("stale: this is the last good picture", theme::WARNING)
+    } else {
+        return;
+    };
+    let area =
+        Area::new(Id::unique("kiln status")).order(Order::Middle).fixed_pos(place.min + vec2(MARGIN, MARGIN));
+    area.show(ui.ctx(), |ui| {
+        theme::card_frame(color).show(ui, |ui| ui.label(RichText::new(text).color(color)));
+    });
+}
+
+fn show_diagnostic(ui: &mut Ui, diagnostic: &Diagnostic) {
+    ui.spacing_mut().item_spacing.y = 3.0;
+    ui.horizontal_wrapped(|ui| {
+        let color = color_of(diagnostic.severity);
+        ui.label(RichText::new(diagnostic.severity.to_string()).strong().color(color));
+        ui.label(RichText::new(&diagnostic.message).strong());
+    });
+    if let Some(file) = &diagnostic.file {
+        let place = diagnostic.span.as_ref().map(|span| format!(":{}:{}", span.line, span.column));
+        let text = format!("{file}{}", place.unwrap_or_default());
+        ui.label(RichText::new(text).monospace().color(theme::ACCENT));
+    }
+    if let Some(span) = &diagnostic.span {
+        show_excerpt(ui, span, color_of(diagnostic.severity));
+    }
+    for note in &diagnostic.notes {
+        ui.label(RichText::new(note).small().color(theme::WEAK));
+    }
+    if let Some(help) = &diagnostic.help {
+        ui.label(RichText::new(format!("help: {help}")).color(theme::GOOD));
+    }
+}
+
+/// The source line, and carets below the place.
+fn show_excerpt(ui: &mut Ui, span: &Span, color: egui::Color32) {
+    ui.spacing_mut().item_spacing.y = 0.0;
+    let number = span.line.to_string();
+    let margin = " ".repeat(number.len());
+    // Tabs would be of unknown width here: both lines get the same spaces instead.
+    let expand = |text: &str| text.replace('\t', "    ");
+    let before: String = span.source_line.chars().take(span.column as usize - 1).collect();
+    let indent = " ".repeat(expand(&before).chars().count());
+    let visible = span.source_line.chars().count().saturating_sub(before.chars().count()).max(1);
+    let carets = "^".repeat((span.length_chars as usize).min(visible));
+    let line = [(format!("{number} | "), theme::WEAK), (expand(&span.source_line), theme::TEXT)];
+    ui.add(egui::Label::new(monospace(line)).extend());
+    let place = [(format!("{margin} | {indent}"), theme::WEAK), (carets, color)];
+    ui.add(egui::Label::new(monospace(place)).extend());
+    ui.spacing_mut().item_spacing.y = 3.0;
+}
+
+/// One line of text in several colours.
+fn monospace<const N: usize>(runs: [(String, egui::Color32); N]) -> LayoutJob {
+    let mut line = LayoutJob::default();
+    for (text, color) in runs {
+        line.append(&text, 0.0, TextFormat::simple(egui::FontId::monospace(12.0), color));
+    }
+    line
+}
+
+fn color_of(severity: Severity) -> egui::Color32 {
+    match severity {
+        Severity::Error => theme::ERROR,
+        Severity::Warning => theme::WARNING,
+        Severity::Note => theme::WEAK,
+    }
+}

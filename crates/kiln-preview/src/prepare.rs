@@ -1,0 +1,317 @@
+//! From a revision to device resources, away from the thread that draws.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use kiln_diagnostic::Diagnostic;
+use kiln_gpu::Gpu;
+use kiln_link::{Revision, Target};
+use kiln_scene::{Effect, Material, variant_name};
+use kiln_shader::Reflection;
+
+use crate::binding::FrameBinding;
+use crate::draw_list::DrawList;
+use crate::keeper::{Keeper, Key};
+use crate::neutral;
+use crate::program::{Program, Raster};
+use crate::report::{ApplyReport, choose, describe};
+use crate::scene_gpu::GpuScene;
+use crate::target::{CubeMeta, LutMeta, Role, SceneMeta, ShaderMeta, read_meta};
+use crate::texture::{CubeTexture, LutTexture, create_trilinear_sampler};
+use crate::view::Selection;
+
+/// The environment as shaders read it.
+#[derive(Clone, Debug)]
+pub(crate) struct Environment {
+    pub skybox: Arc<CubeTexture>,
+    pub irradiance: Arc<CubeTexture>,
+    pub specular: Arc<CubeTexture>,
+    pub lut_ggx: Arc<LutTexture>,
+    pub sampler: wgpu::Sampler,
+}
+
+/// One selection of a revision, ready to be drawn.
+#[derive(Debug)]
+pub(crate) struct Prepared {
+    pub report: ApplyReport,
+    pub environment: Environment,
+    pub scene: Option<Arc<GpuScene>>,
+    pub draws: DrawList,
+    pub background: Option<(wgpu::RenderPipeline, FrameBinding)>,
+    pub tonemap: Arc<Program>,
+    /// Whether a shader in use reads the time.
+    pub is_animated: bool,
+}
+
+/// Makes [`Prepared`]s and keeps what several of them share.
+#[derive(Debug)]
+pub(crate) struct Preparer {
+    gpu: Gpu,
+    cubes: Keeper<CubeTexture>,
+    luts: Keeper<LutTexture>,
+    scenes: Keeper<GpuScene>,
+    programs: Keeper<Program>,
+    neutral_cube: Arc<CubeTexture>,
+    neutral_lut: Arc<LutTexture>,
+    neutral_tonemap: Option<Arc<Program>>,
+    sampler: wgpu::Sampler,
+}
+
+impl Preparer {
+    /// Makes the neutral resources.
+    pub fn new(gpu: &Gpu) -> Self {
+        let (tonemap, _) = gpu.catch_errors(|| {
+            let (wgsl, reflection) = (neutral::TONEMAP_WGSL, neutral::tonemap_reflection());
+            Program::new(&gpu.device, "built-in tonemap", Role::Tonemap, wgsl, &reflection)
+        });
+        Preparer {
+            gpu: gpu.clone(),
+            cubes: Keeper::default(),
+            luts: Keeper::default(),
+            scenes: Keeper::default(),
+            programs: Keeper::default(),
+            neutral_cube: Arc::new(CubeTexture::neutral(gpu)),
+            neutral_lut: Arc::new(LutTexture::neutral(gpu)),
+            neutral_tonemap: tonemap.ok().map(Arc::new),
+            sampler: create_trilinear_sampler(gpu),
+        }
+    }
+
+    /// Makes everything that drawing the selection needs, or takes it over from earlier. `None` only if the device
+    /// does not even accept the built-in tonemap.
+    pub fn prepare(&mut self, revision: &Revision, selection: &Selection) -> Option<Prepared> {
+        let mut report = describe(revision);
+        let scene_name = choose(selection.scene.as_deref(), None, &report.scenes, "scene", &mut report.notes);
+        let meta = scene_name.as_ref().and_then(|name| scene_meta(revision, name, &mut report));
+        let scene = scene_name.as_ref().and_then(|name| self.scene(revision, name, &mut report));
+        let scene_env = meta.as_ref().and_then(|meta| meta.env.as_deref());
+        let env = choose(selection.env.as_deref(), scene_env, &report.envs, "environment", &mut report.notes);
+        let environment = self.environment(revision, env.as_deref(), &mut report);
+        let tonemap = self.full_screen_program(revision, Role::Tonemap, &mut report);
+        let tonemap = tonemap.or_else(|| self.neutral_tonemap.clone())?;
+        let background = self.full_screen_program(revision, Role::Background, &mut report).map(|program| {
+            let pipeline = program.pipeline(&self.gpu.device, Raster::FULL_SCREEN);
+            (pipeline, FrameBinding::new(&self.gpu, &program, &environment, None))
+        });
+        let shader = meta.map_or_else(|| "pbr".to_owned(), |meta| meta.shader);
+        let draws =
+            scene.as_ref().map(|scene| self.draws(revision, scene, &shader, &environment, &mut report));
+        report.shown = Selection { scene: scene_name, env };
+        self.forget(revision, &report.shown);
+        let draws = draws.unwrap_or_default();
+        let frames = background
+            .iter()
+            .map(|(_, frame)| frame)
+            .chain(draws.programs.iter().map(|program| &program.frame));
+        let is_animated = tonemap.reads_time() || frames.into_iter().any(FrameBinding::reads_time);
+        Some(Prepared { report, environment, scene, draws, background, tonemap, is_animated })
+    }
+
+    fn scene(&mut self, revision: &Revision, name: &str, report: &mut ApplyReport) -> Option<Arc<GpuScene>> {
+        let target_name = format!("scene/{name}");
+        let target = revision.table.targets.get(&target_name)?;
+        let gpu = &self.gpu;
+        let resolved = self.scenes.resolve(gpu, &target_name, Key::of(target), || {
+            let glb = revision.part(&target_name, "glb");
+            let glb =
+                glb.ok_or_else(|| Diagnostic::error(format!("target `{target_name}` has no part `glb`")))?;
+            GpuScene::upload(gpu, name, glb)
+        });
+        let scene = report.take(&target_name, resolved);
+        if let Some(scene) = &scene {
+            report.notes.extend(scene.scene.notes.iter().cloned());
+        }
+        scene
+    }
+
+    fn environment(
+        &mut self,
+        revision: &Revision,
+        env: Option<&str>,
+        report: &mut ApplyReport,
+    ) -> Environment {
+        let mut cube = |map: &str| match env {
+            Some(env) => self.cube(revision, &format!("env/{env}/{map}"), report),
+            None => Arc::clone(&self.neutral_cube),
+        };
+        let (skybox, irradiance, specular) = (cube("skybox"), cube("irradiance"), cube("specular"));
+        let lut_ggx = self.lut(revision, "lut/ggx", report);
+        Environment { skybox, irradiance, specular, lut_ggx, sampler: self.sampler.clone() }
+    }
+
+    fn cube(&mut self, revision: &Revision, name: &str, report: &mut ApplyReport) -> Arc<CubeTexture> {
+        let Some(target) = revision.table.targets.get(name) else {
+            let last_good = self.cubes.last_good(name);
+            report.notes.push(absent(name, revision, last_good.is_some()));
+            return last_good.unwrap_or_else(|| Arc::clone(&self.neutral_cube));
+        };
+        let gpu = &self.gpu;
+        let resolved = self.cubes.resolve(gpu, name, Key::of(target), || {
+            let meta: CubeMeta = read_meta(name, target, "cube")?;
+            CubeTexture::upload(gpu, name, target, revision, &meta)
+        });
+        let cube = report.take(name, resolved);
+        let cube = cube.unwrap_or_else(|| Arc::clone(&self.neutral_cube));
+        report.notes.extend(cube.notes.iter().cloned());
+        cube
+    }
+
+    fn lut(&mut self, revision: &Revision, name: &str, report: &mut ApplyReport) -> Arc<LutTexture> {
+        let Some(target) = revision.table.targets.get(name) else {
+            let last_good = self.luts.last_good(name);
+            report.notes.push(absent(name, revision, last_good.is_some()));
+            return last_good.unwrap_or_else(|| Arc::clone(&self.neutral_lut));
+        };
+        let gpu = &self.gpu;
+        let resolved = self.luts.resolve(gpu, name, Key::of(target), || {
+            let meta: LutMeta = read_meta(name, target, "lut")?;
+            let texels = revision.part(name, "texels");
+            let texels =
+                texels.ok_or_else(|| Diagnostic::error(format!("target `{name}` has no part `texels`")))?;
+            LutTexture::upload(gpu, name, texels, &meta)
+        });
+        report.take(name, resolved).unwrap_or_else(|| Arc::clone(&self.neutral_lut))
+    }
+
+    /// The project's background or tonemap: the first shader with that role.
+    fn full_screen_program(
+        &mut self,
+        revision: &Revision,
+        role: Role,
+        report: &mut ApplyReport,
+    ) -> Option<Arc<Program>> {
+        let has_role = |target: &Target| ShaderMeta::is_of_role(target, role);
+        let name =
+            revision.targets_under("shader/").find(|(_, target)| has_role(target)).map(|(name, _)| name);
+        let Some(name) = name else {
+            report.notes.push(format!("this project has no {role} shader that works yet"));
+            return None;
+        };
+        self.program(revision, name, role, report)
+    }
+
+    fn program(
+        &mut self,
+        revision: &Revision,
+        name: &str,
+        role: Role,
+        report: &mut ApplyReport,
+    ) -> Option<Arc<Program>> {
+        let target = revision.table.targets.get(name)?;
+        let device = &self.gpu.device;
+        let resolved = self.programs.resolve(&self.gpu, name, Key::of(target), || {
+            let meta: ShaderMeta = read_meta(name, target, "shader")?;
+            if meta.role != role {
+                return Err(Diagnostic::error(format!(
+                    "`{name}` is a {} shader, not a {role} shader",
+                    meta.role
+                )));
+            }
+            let (wgsl, reflection) = read_shader(revision, name)?;
+            let program = Program::new(device, name, role, &wgsl, &reflection)?;
+            // Made here, because only a pipeline shows whether module and layout fit.
+            program.pipeline(device, Raster::of_role(role));
+            Ok(program)
+        });
+        report.take(name, resolved)
+    }
+
+    fn draws(
+        &mut self,
+        revision: &Revision,
+        scene: &GpuScene,
+        shader: &str,
+        environment: &Environment,
+        report: &mut ApplyReport,
+    ) -> DrawList {
+        let mut found: HashMap<String, Option<Arc<Program>>> = HashMap::new();
+        let gpu = self.gpu.clone();
+        let mut find = |material: &Material| {
+            note_approximations(material, &mut report.notes);
+            let name = format!("shader/{shader}/{}", variant_name(&material.effects));
+            if !found.contains_key(&name) {
+                let program = self.variant(revision, shader, &name, report);
+                found.insert(name.clone(), program);
+            }
+            found[&name].clone()
+        };
+        let (draws, fault) = gpu.catch_errors(|| DrawList::new(&gpu, scene, environment, &mut find));
+        let faulty =
+            |fault: String| Diagnostic::error("the scene cannot be bound to its shaders").with_note(fault);
+        report.diagnostics.extend(fault.map(faulty));
+        draws
+    }
+
+    /// The variant, its last good form, or the shader without features: something close beats nothing.
+    fn variant(
+        &mut self,
+        revision: &Revision,
+        shader: &str,
+        name: &str,
+        report: &mut ApplyReport,
+    ) -> Option<Arc<Program>> {
+        if let Some(program) = self.program(revision, name, Role::Material, report) {
+            return Some(program);
+        }
+        if let Some(program) = self.programs.last_good(name) {
+            report.notes.push(absent(name, revision, true));
+            return Some(program);
+        }
+        let program = self.program(revision, &format!("shader/{shader}/base"), Role::Material, report);
+        let instead = if program.is_some() { "drawn without its effects" } else { "not drawn" };
+        report.notes.push(format!("`{name}` is absent: what needs it is {instead}"));
+        program
+    }
+
+    /// Drops what neither this revision nor the picture uses.
+    fn forget(&mut self, revision: &Revision, shown: &Selection) {
+        let env = format!("env/{}/", shown.env.as_deref().unwrap_or_default());
+        let is_kept = |name: &str| revision.table.targets.contains_key(name) || name.starts_with(&env);
+        self.cubes.retain(&revision.table, is_kept);
+        self.luts.retain(&revision.table, |_| true);
+        self.scenes.retain(&revision.table, is_kept);
+        self.programs.retain(&revision.table, |_| true);
+    }
+}
+
+fn scene_meta(revision: &Revision, name: &str, report: &mut ApplyReport) -> Option<SceneMeta> {
+    let target_name = format!("scene/{name}");
+    let Some(target) = revision.table.targets.get(&target_name) else {
+        report.notes.push(absent(&target_name, revision, false));
+        return None;
+    };
+    match read_meta::<SceneMeta>(&target_name, target, "scene") {
+        Ok(meta) => {
+            report.notes.extend(meta.notes.iter().cloned());
+            Some(meta)
+        }
+        Err(diagnostic) => {
+            report.diagnostics.push(diagnostic);
+            None
+        }
+    }
+}
+
+fn absent(name: &str, revision: &Revision, has_last_good: bool) -> String {
+    let instead = if has_last_good { "its last good form is shown" } else { "a neutral one stands in" };
+    format!("`{name}` is absent from revision {}: {instead}", revision.table.number)
+}
+
+fn read_shader(revision: &Revision, name: &str) -> Result<(String, Reflection), Diagnostic> {
+    let part = |part: &str| {
+        let bytes = revision.part(name, part);
+        bytes.ok_or_else(|| Diagnostic::error(format!("target `{name}` has no part `{part}`")))
+    };
+    let wgsl = String::from_utf8(part("wgsl")?.to_vec())
+        .map_err(|error| Diagnostic::error(format!("the text of `{name}` is not UTF-8: {error}")))?;
+    let reflection = serde_json::from_slice(part("reflection")?)
+        .map_err(|error| Diagnostic::error(format!("the interface of `{name}` is malformed: {error}")))?;
+    Ok((wgsl, reflection))
+}
+
+fn note_approximations(material: &Material, notes: &mut Vec<String>) {
+    let note = "sheen is approximate until the Charlie chain exists";
+    if material.effects.contains(&Effect::Sheen) && !notes.iter().any(|other| other == note) {
+        notes.push(note.to_owned());
+    }
+}

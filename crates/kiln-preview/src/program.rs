@@ -1,0 +1,361 @@
+//! A compiled shader: its interface checked by name, its layouts, and its pipelines per raster state.
+
+use std::collections::HashMap;
+use std::sync::{Mutex, PoisonError};
+
+use kiln_diagnostic::Diagnostic;
+use kiln_scene::Vertex;
+use kiln_shader::{Binding, BindingKind, Member, Reflection, Stage};
+
+use crate::slot::Slot;
+use crate::target::Role;
+use crate::uniform::{FrameValues, Value, draw_member, long_type_name, material_member};
+
+/// Format of the image that material and background shaders write.
+pub(crate) const HDR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
+/// Format of the image that the tonemap writes: sRGB-encoded values in a texture that does not encode.
+pub(crate) const OUTPUT_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+/// Format of the depth buffer; 0 is near.
+pub(crate) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+/// Samples a pixel of the image that material and background shaders write.
+pub(crate) const SAMPLE_COUNT: u32 = 4;
+
+/// Largest uniform block accepted; wgpu's default limit.
+const UNIFORM_BYTES_MAX: u32 = 65536;
+
+/// How triangles of a material are rasterised and blended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct Raster {
+    pub cull: Option<wgpu::Face>,
+    pub front_face: wgpu::FrontFace,
+    pub blend: bool,
+}
+
+impl Raster {
+    /// For the triangle that covers the screen.
+    pub const FULL_SCREEN: Raster = Raster { cull: None, front_face: wgpu::FrontFace::Ccw, blend: false };
+
+    /// The one that a shader of this role is most likely drawn with.
+    pub fn of_role(role: Role) -> Self {
+        match role {
+            Role::Material => Raster { cull: Some(wgpu::Face::Back), ..Self::FULL_SCREEN },
+            Role::Background | Role::Tonemap => Self::FULL_SCREEN,
+        }
+    }
+}
+
+/// A binding whose name is known.
+#[derive(Clone, Debug)]
+pub(crate) struct Bound {
+    pub binding: u32,
+    pub slot: Slot,
+    /// Of uniforms: size and members.
+    pub block: Option<(u32, Vec<Member>)>,
+}
+
+impl Bound {
+    /// Whether it is the frame's block and has the time.
+    pub fn reads_time(&self) -> bool {
+        let members = self.block.as_ref().map_or(&[][..], |(_, members)| members);
+        self.slot == Slot::Frame && members.iter().any(|member| member.name == "time_s")
+    }
+}
+
+/// A shader module ready to make pipelines.
+#[derive(Debug)]
+pub(crate) struct Program {
+    role: Role,
+    module: wgpu::ShaderModule,
+    attributes: Vec<wgpu::VertexAttribute>,
+    /// Bindings by group.
+    pub groups: [Vec<Bound>; 3],
+    /// Layouts by group; `None` where nothing is declared.
+    pub layouts: [Option<wgpu::BindGroupLayout>; 3],
+    pipeline_layout: wgpu::PipelineLayout,
+    pipelines: Mutex<HashMap<Raster, wgpu::RenderPipeline>>,
+}
+
+impl Program {
+    /// Checks the interface and creates module and layouts. Faults that wgpu finds go to the error scope.
+    pub fn new(
+        device: &wgpu::Device,
+        name: &str,
+        role: Role,
+        wgsl: &str,
+        reflection: &Reflection,
+    ) -> Result<Self, Diagnostic> {
+        let attributes = check_entry_points(name, role, reflection)?;
+        let groups = check_bindings(name, role, &reflection.bindings)?;
+        let layouts = [0, 1, 2].map(|group| create_layout(device, name, group, &groups[group], reflection));
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(name),
+            bind_group_layouts: &layouts.each_ref().map(Option::as_ref),
+            immediate_size: 0,
+        });
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(name),
+            source: wgpu::ShaderSource::Wgsl(wgsl.into()),
+        });
+        let pipelines = Mutex::default();
+        Ok(Program { role, module, attributes, groups, layouts, pipeline_layout, pipelines })
+    }
+
+    /// The pipeline for a raster state, created on first use.
+    pub fn pipeline(&self, device: &wgpu::Device, raster: Raster) -> wgpu::RenderPipeline {
+        let mut pipelines = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
+        pipelines.entry(raster).or_insert_with(|| self.create_pipeline(device, raster)).clone()
+    }
+
+    /// Whether pictures change with time.
+    pub fn reads_time(&self) -> bool {
+        self.groups[0].iter().any(Bound::reads_time)
+    }
+
+    fn create_pipeline(&self, device: &wgpu::Device, raster: Raster) -> wgpu::RenderPipeline {
+        let buffers = [Some(wgpu::VertexBufferLayout {
+            array_stride: size_of::<Vertex>() as u64,
+            step_mode: wgpu::VertexStepMode::Vertex,
+            attributes: &self.attributes,
+        })];
+        let is_tonemap = self.role == Role::Tonemap;
+        device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: None,
+            layout: Some(&self.pipeline_layout),
+            vertex: wgpu::VertexState {
+                module: &self.module,
+                entry_point: Some("vs_main"),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                buffers: if self.role == Role::Material { &buffers } else { &[] },
+            },
+            primitive: wgpu::PrimitiveState {
+                cull_mode: raster.cull,
+                front_face: raster.front_face,
+                ..Default::default()
+            },
+            depth_stencil: (!is_tonemap).then(|| self.depth_state(raster)),
+            multisample: wgpu::MultisampleState {
+                count: if is_tonemap { 1 } else { SAMPLE_COUNT },
+                ..Default::default()
+            },
+            fragment: Some(wgpu::FragmentState {
+                module: &self.module,
+                entry_point: Some("fs_main"),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                targets: &[Some(wgpu::ColorTargetState {
+                    format: if is_tonemap { OUTPUT_FORMAT } else { HDR_FORMAT },
+                    blend: raster.blend.then_some(wgpu::BlendState::ALPHA_BLENDING),
+                    write_mask: wgpu::ColorWrites::ALL,
+                })],
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+    }
+
+    /// The background lies on the far plane, where the cleared depth is too, and hides nothing.
+    fn depth_state(&self, raster: Raster) -> wgpu::DepthStencilState {
+        let is_material = self.role == Role::Material;
+        let compare =
+            if is_material { wgpu::CompareFunction::Less } else { wgpu::CompareFunction::LessEqual };
+        wgpu::DepthStencilState {
+            format: DEPTH_FORMAT,
+            depth_write_enabled: Some(is_material && !raster.blend),
+            depth_compare: Some(compare),
+            stencil: wgpu::StencilState::default(),
+            bias: wgpu::DepthBiasState::default(),
+        }
+    }
+}
+
+fn check_entry_points(
+    name: &str,
+    role: Role,
+    reflection: &Reflection,
+) -> Result<Vec<wgpu::VertexAttribute>, Diagnostic> {
+    for (entry, stage) in [("vs_main", Stage::Vertex), ("fs_main", Stage::Fragment)] {
+        if !reflection.entry_points.iter().any(|point| point.name == entry && point.stage == stage) {
+            return Err(Diagnostic::error(format!("`{name}` has no entry point `{entry}`")).with_note(
+                "every shader needs the vertex entry `vs_main` and the fragment entry `fs_main`",
+            ));
+        }
+    }
+    let vertex = reflection.entry_points.iter().find(|point| point.name == "vs_main");
+    let inputs = vertex.map_or(&[][..], |point| &point.inputs);
+    if role != Role::Material && !inputs.is_empty() {
+        return Err(Diagnostic::error(format!("`{name}` reads the vertex input `{}`", inputs[0].name))
+            .with_note("background and tonemap draw one triangle by `@builtin(vertex_index)` alone"));
+    }
+    inputs.iter().map(|input| vertex_attribute(name, &input.name, &input.ty, input.location)).collect()
+}
+
+fn vertex_attribute(
+    shader: &str,
+    input: &str,
+    ty: &str,
+    shader_location: u32,
+) -> Result<wgpu::VertexAttribute, Diagnostic> {
+    use wgpu::VertexFormat::{Float32x2, Float32x3, Float32x4};
+    let (format, offset, expected) = match input {
+        "position" => (Float32x3, std::mem::offset_of!(Vertex, position), "vec3<f32>"),
+        "normal" => (Float32x3, std::mem::offset_of!(Vertex, normal), "vec3<f32>"),
+        "tangent" => (Float32x4, std::mem::offset_of!(Vertex, tangent), "vec4<f32>"),
+        "uv0" => (Float32x2, std::mem::offset_of!(Vertex, uv0), "vec2<f32>"),
+        "uv1" => (Float32x2, std::mem::offset_of!(Vertex, uv1), "vec2<f32>"),
+        "color" => (Float32x4, std::mem::offset_of!(Vertex, color), "vec4<f32>"),
+        _ => {
+            return Err(Diagnostic::error(format!("`{shader}` reads the unknown vertex input `{input}`"))
+                .with_help("use position, normal, tangent, uv0, uv1 or color"));
+        }
+    };
+    if long_type_name(ty) != expected {
+        let message = format!("`{shader}` reads the vertex input `{input}` as {ty}; it is a {expected}");
+        return Err(Diagnostic::error(message));
+    }
+    Ok(wgpu::VertexAttribute { format, offset: offset as u64, shader_location })
+}
+
+fn check_bindings(shader: &str, role: Role, bindings: &[Binding]) -> Result<[Vec<Bound>; 3], Diagnostic> {
+    let mut groups: [Vec<Bound>; 3] = Default::default();
+    for binding in bindings {
+        let slot = check_binding(shader, role, binding)?;
+        let block = match &binding.kind {
+            BindingKind::Uniform { size_bytes, members } => {
+                check_members(shader, slot, &binding.name, *size_bytes, members)?;
+                Some((*size_bytes, members.clone()))
+            }
+            _ => None,
+        };
+        groups[slot.group() as usize].push(Bound { binding: binding.binding, slot, block });
+    }
+    Ok(groups)
+}
+
+fn check_binding(shader: &str, role: Role, binding: &Binding) -> Result<Slot, Diagnostic> {
+    let name = &binding.name;
+    let Some(slot) = Slot::from_name(name) else {
+        return Err(Diagnostic::error(format!("`{shader}` declares `{name}`, which Kiln does not know"))
+            .with_help("names that can be bound are listed in docs/shader-interface.md"));
+    };
+    if slot.group() > 0 && role != Role::Material {
+        return Err(Diagnostic::error(format!("`{shader}` declares `{name}`, which only materials have")));
+    }
+    if slot == Slot::HdrColor && role != Role::Tonemap {
+        return Err(Diagnostic::error(format!(
+            "`{shader}` declares `{name}`, which only a tonemap can read"
+        )));
+    }
+    if binding.group != slot.group() {
+        let message =
+            format!("`{shader}` declares `{name}` in group {}; its group is {}", binding.group, slot.group());
+        return Err(Diagnostic::error(message));
+    }
+    if !slot.accepts(&binding.kind) {
+        let message = format!("`{shader}` declares `{name}` as something else than a {}", slot.expects());
+        return Err(Diagnostic::error(message).with_note(format!("it declares {:?}", binding.kind)));
+    }
+    Ok(slot)
+}
+
+fn check_members(
+    shader: &str,
+    slot: Slot,
+    block: &str,
+    size_bytes: u32,
+    members: &[Member],
+) -> Result<(), Diagnostic> {
+    if size_bytes == 0 || size_bytes > UNIFORM_BYTES_MAX {
+        let message =
+            format!("`{shader}` declares `{block}` of {size_bytes} bytes; 1 to {UNIFORM_BYTES_MAX} fit");
+        return Err(Diagnostic::error(message));
+    }
+    // A leading underscore marks padding: it stays zero.
+    for member in members.iter().filter(|member| !member.name.starts_with('_')) {
+        let name = &member.name;
+        let Some(value) = example_of(slot, name) else {
+            let message = format!("`{shader}` declares `{block}.{name}`, which Kiln does not know");
+            return Err(Diagnostic::error(message)
+                .with_help("members are listed in docs/shader-interface.md; padding begins with `_`"));
+        };
+        if long_type_name(&member.ty) != value.wgsl_type() {
+            let message = format!(
+                "`{shader}` declares `{block}.{name}` as {}; it is a {}",
+                member.ty,
+                value.wgsl_type()
+            );
+            return Err(Diagnostic::error(message));
+        }
+    }
+    Ok(())
+}
+
+/// Some value of the member, for its type.
+fn example_of(slot: Slot, member: &str) -> Option<Value> {
+    match slot {
+        Slot::Frame => FrameValues::default().member(member),
+        Slot::Material => material_member(&crate::neutral::material(), member),
+        Slot::Draw => draw_member(glam::Mat4::IDENTITY, member),
+        _ => None,
+    }
+}
+
+fn create_layout(
+    device: &wgpu::Device,
+    name: &str,
+    group: usize,
+    bounds: &[Bound],
+    reflection: &Reflection,
+) -> Option<wgpu::BindGroupLayout> {
+    if bounds.is_empty() {
+        return None;
+    }
+    let stages = |binding: u32| {
+        let found =
+            reflection.bindings.iter().find(|other| (other.group, other.binding) == (group as u32, binding));
+        found.map_or(wgpu::ShaderStages::NONE, |binding| shader_stages(&binding.stages))
+    };
+    let entry = |bound: &Bound| wgpu::BindGroupLayoutEntry {
+        binding: bound.binding,
+        visibility: stages(bound.binding),
+        ty: binding_type(bound),
+        count: None,
+    };
+    let entries: Vec<_> = bounds.iter().map(entry).collect();
+    Some(
+        device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some(name),
+            entries: &entries,
+        }),
+    )
+}
+
+fn shader_stages(stages: &[Stage]) -> wgpu::ShaderStages {
+    let one = |stage: &Stage| match stage {
+        Stage::Vertex => wgpu::ShaderStages::VERTEX,
+        Stage::Fragment => wgpu::ShaderStages::FRAGMENT,
+        Stage::Compute => wgpu::ShaderStages::COMPUTE,
+    };
+    stages.iter().map(one).fold(wgpu::ShaderStages::NONE, |all, stage| all | stage)
+}
+
+fn binding_type(bound: &Bound) -> wgpu::BindingType {
+    let texture = |view_dimension| wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Float { filterable: true },
+        view_dimension,
+        multisampled: false,
+    };
+    match bound.slot {
+        Slot::Frame | Slot::Material | Slot::Draw => wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Uniform,
+            // Draws share one buffer, each at its own offset.
+            has_dynamic_offset: bound.slot == Slot::Draw,
+            min_binding_size: bound.block.as_ref().and_then(|(size, _)| u64::from(*size).try_into().ok()),
+        },
+        Slot::EnvSkybox | Slot::EnvIrradiance | Slot::EnvSpecular => {
+            texture(wgpu::TextureViewDimension::Cube)
+        }
+        Slot::LutGgx | Slot::HdrColor | Slot::MaterialTexture(_) => texture(wgpu::TextureViewDimension::D2),
+        Slot::EnvSampler | Slot::LutSampler | Slot::MaterialSampler(_) => {
+            wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)
+        }
+    }
+}

@@ -1,0 +1,268 @@
+//! Draws what was prepared into an offscreen picture.
+
+use std::cmp::Ordering;
+use std::sync::Arc;
+
+use glam::{Mat4, Vec3};
+use kiln_gpu::Gpu;
+
+use crate::binding::FrameBinding;
+use crate::camera::OrbitCamera;
+use crate::draw_list::{DrawItem, DrawList};
+use crate::prepare::Prepared;
+use crate::program::{DEPTH_FORMAT, HDR_FORMAT, OUTPUT_FORMAT, Raster, SAMPLE_COUNT};
+use crate::scene_gpu::GpuScene;
+use crate::uniform::FrameValues;
+use crate::view::View;
+
+/// Draws one prepared revision after another; what it shows changes only by [`Renderer::show`].
+#[derive(Debug)]
+pub(crate) struct Renderer {
+    gpu: Gpu,
+    picture: Picture,
+    shown: Option<Arc<Prepared>>,
+    tonemap: Option<FrameBinding>,
+}
+
+/// The images a frame goes through.
+#[derive(Debug)]
+struct Picture {
+    size: [u32; 2],
+    /// Linear radiance, several samples a pixel.
+    samples: wgpu::TextureView,
+    /// Linear radiance.
+    hdr: wgpu::TextureView,
+    depth: wgpu::TextureView,
+    output: wgpu::Texture,
+    output_view: wgpu::TextureView,
+}
+
+impl Renderer {
+    /// A renderer that shows nothing yet. `size` is width and height in pixels.
+    pub fn new(gpu: &Gpu, size: [u32; 2]) -> Self {
+        Renderer { gpu: gpu.clone(), picture: Picture::new(gpu, size), shown: None, tonemap: None }
+    }
+
+    /// Changes the picture's size, limited to what the device takes; true if it changed.
+    pub fn resize(&mut self, size: [u32; 2]) -> bool {
+        let size = Picture::allowed_size(&self.gpu, size);
+        if size == self.picture.size {
+            return false;
+        }
+        self.picture = Picture::new(&self.gpu, size);
+        self.bind_tonemap();
+        true
+    }
+
+    /// Replaces what is shown.
+    pub fn show(&mut self, prepared: Arc<Prepared>) {
+        self.shown = Some(prepared);
+        self.bind_tonemap();
+    }
+
+    /// What is shown.
+    pub fn shown(&self) -> Option<&Prepared> {
+        self.shown.as_deref()
+    }
+
+    /// The finished picture: `Rgba8Unorm`, sRGB-encoded values.
+    pub fn output(&self) -> &wgpu::Texture {
+        &self.picture.output
+    }
+
+    /// The same as a view.
+    pub fn output_view(&self) -> &wgpu::TextureView {
+        &self.picture.output_view
+    }
+
+    /// Width / height.
+    pub fn aspect(&self) -> f32 {
+        self.picture.size[0] as f32 / self.picture.size[1] as f32
+    }
+
+    /// The camera that `view` asks for.
+    pub fn camera(&self, view: &View) -> Option<OrbitCamera> {
+        let of_scene =
+            || Some(OrbitCamera::for_scene(&self.shown.as_ref()?.scene.as_ref()?.scene, self.aspect()));
+        view.camera.or_else(of_scene)
+    }
+
+    /// Draws a frame and submits it; `None` if nothing was ever shown.
+    pub fn render(&self, view: &View) -> Option<wgpu::SubmissionIndex> {
+        let (prepared, tonemap) = (self.shown.as_ref()?, self.tonemap.as_ref()?);
+        let values = self.frame_values(prepared, view);
+        let background = prepared.background.iter().map(|(_, frame)| frame);
+        let programs = prepared.draws.programs.iter().map(|program| &program.frame);
+        for frame in background.chain(programs).chain([tonemap]) {
+            frame.write(&self.gpu, &values);
+        }
+        let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        self.draw_scene(&mut encoder, prepared, values.camera_position);
+        self.draw_tonemap(&mut encoder, prepared, tonemap);
+        Some(self.gpu.queue.submit([encoder.finish()]))
+    }
+
+    fn bind_tonemap(&mut self) {
+        let bind = |prepared: &Arc<Prepared>| {
+            FrameBinding::new(&self.gpu, &prepared.tonemap, &prepared.environment, Some(&self.picture.hdr))
+        };
+        self.tonemap = self.shown.as_ref().map(bind);
+    }
+
+    fn frame_values(&self, prepared: &Prepared, view: &View) -> FrameValues {
+        let environment = &prepared.environment;
+        let bounds = prepared.scene.as_ref().and_then(|scene| scene.scene.bounds);
+        let camera = self.camera(view).unwrap_or(OrbitCamera::BACKGROUND_ONLY);
+        FrameValues {
+            clip_from_world: camera.clip_from_world(bounds, self.aspect()),
+            camera_position: camera.position(),
+            exposure: view.exposure_ev.exp2(),
+            // The lookup turns the other way round.
+            environment_from_world: Mat4::from_rotation_y(-view.environment_rotation_rad),
+            environment_intensity: view.environment_intensity,
+            specular_level_max: (environment.specular.levels - 1) as f32,
+            skybox_scale: environment.skybox.scale,
+            irradiance_scale: environment.irradiance.scale,
+            specular_scale: environment.specular.scale,
+            background_blur: view.background_blur,
+            viewport_size: self.picture.size.map(|pixels| pixels as f32),
+            time_s: view.time_s,
+        }
+    }
+
+    fn draw_scene(&self, encoder: &mut wgpu::CommandEncoder, prepared: &Prepared, eye: Vec3) {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("scene"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &self.picture.samples,
+                depth_slice: None,
+                resolve_target: Some(&self.picture.hdr),
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                    store: wgpu::StoreOp::Discard,
+                },
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &self.picture.depth,
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(1.0),
+                    store: wgpu::StoreOp::Discard,
+                }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        // Opaque draws from near to far, so that depth saves shading; blended ones from far to near.
+        let DrawList { opaque, blended, .. } = &prepared.draws;
+        self.draw_items(
+            &mut pass,
+            prepared,
+            sorted(opaque, |a, b| distance(a, eye).total_cmp(&distance(b, eye))),
+        );
+        self.draw_background(&mut pass, prepared);
+        self.draw_items(
+            &mut pass,
+            prepared,
+            sorted(blended, |a, b| distance(b, eye).total_cmp(&distance(a, eye))),
+        );
+    }
+
+    fn draw_items(&self, pass: &mut wgpu::RenderPass<'_>, prepared: &Prepared, items: Vec<&DrawItem>) {
+        let Some(scene) = &prepared.scene else { return };
+        for item in items {
+            draw_item(pass, scene, &prepared.draws, item);
+        }
+    }
+
+    /// Fills what is still open. The viewport puts it on the far plane, at whatever depth its author chose.
+    fn draw_background(&self, pass: &mut wgpu::RenderPass<'_>, prepared: &Prepared) {
+        let Some((pipeline, frame)) = &prepared.background else { return };
+        let [width, height] = self.picture.size.map(|pixels| pixels as f32);
+        pass.set_viewport(0.0, 0.0, width, height, 1.0, 1.0);
+        pass.set_pipeline(pipeline);
+        set_group(pass, 0, frame.group.as_ref());
+        pass.draw(0..3, 0..1);
+        pass.set_viewport(0.0, 0.0, width, height, 0.0, 1.0);
+    }
+
+    fn draw_tonemap(&self, encoder: &mut wgpu::CommandEncoder, prepared: &Prepared, frame: &FrameBinding) {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("tonemap"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &self.picture.output_view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations::default(),
+            })],
+            ..Default::default()
+        });
+        pass.set_pipeline(&prepared.tonemap.pipeline(&self.gpu.device, Raster::FULL_SCREEN));
+        set_group(&mut pass, 0, frame.group.as_ref());
+        pass.draw(0..3, 0..1);
+    }
+}
+
+/// Squared, which sorts alike.
+fn distance(item: &DrawItem, eye: Vec3) -> f32 {
+    item.center.distance_squared(eye)
+}
+
+fn sorted(items: &[DrawItem], order: impl Fn(&DrawItem, &DrawItem) -> Ordering) -> Vec<&DrawItem> {
+    let mut items: Vec<&DrawItem> = items.iter().collect();
+    items.sort_by(|a, b| order(a, b));
+    items
+}
+
+fn draw_item(pass: &mut wgpu::RenderPass<'_>, scene: &GpuScene, draws: &DrawList, item: &DrawItem) {
+    let program = &draws.programs[item.program];
+    let mesh = &scene.meshes[item.mesh];
+    pass.set_pipeline(&item.pipeline);
+    set_group(pass, 0, program.frame.group.as_ref());
+    set_group(pass, 1, item.material_group.as_ref());
+    if let Some(group) = &program.draw_group {
+        pass.set_bind_group(2, group, &[item.draw_offset]);
+    }
+    pass.set_vertex_buffer(0, mesh.vertices.slice(..));
+    pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
+    pass.draw_indexed(0..mesh.index_count, 0, 0..1);
+}
+
+fn set_group(pass: &mut wgpu::RenderPass<'_>, index: u32, group: Option<&wgpu::BindGroup>) {
+    if let Some(group) = group {
+        pass.set_bind_group(index, group, &[]);
+    }
+}
+
+impl Picture {
+    fn allowed_size(gpu: &Gpu, size: [u32; 2]) -> [u32; 2] {
+        size.map(|pixels| pixels.clamp(1, gpu.device.limits().max_texture_dimension_2d))
+    }
+
+    fn new(gpu: &Gpu, size: [u32; 2]) -> Self {
+        let size = Self::allowed_size(gpu, size);
+        let attachment = wgpu::TextureUsages::RENDER_ATTACHMENT;
+        let read = attachment | wgpu::TextureUsages::TEXTURE_BINDING;
+        let create = |label, format, sample_count, usage| {
+            gpu.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage,
+                view_formats: &[],
+            })
+        };
+        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let output = create("output", OUTPUT_FORMAT, 1, read | wgpu::TextureUsages::COPY_SRC);
+        Picture {
+            size,
+            samples: view(&create("samples", HDR_FORMAT, SAMPLE_COUNT, attachment)),
+            hdr: view(&create("hdr", HDR_FORMAT, 1, read)),
+            depth: view(&create("depth", DEPTH_FORMAT, SAMPLE_COUNT, attachment)),
+            output_view: view(&output),
+            output,
+        }
+    }
+}

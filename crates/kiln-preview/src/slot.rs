@@ -1,0 +1,143 @@
+//! The names of `docs/shader-interface.md`: what Kiln can bind, and where.
+
+use kiln_scene::{Material, TextureRef};
+use kiln_shader::BindingKind;
+
+/// A material texture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Map {
+    BaseColor,
+    MetallicRoughness,
+    Normal,
+    Occlusion,
+    Emissive,
+    Clearcoat,
+    ClearcoatRoughness,
+    ClearcoatNormal,
+    SheenColor,
+    SheenRoughness,
+    Specular,
+    SpecularColor,
+    Transmission,
+}
+
+impl Map {
+    const ALL: [(Map, &'static str); 13] = [
+        (Map::BaseColor, "base_color"),
+        (Map::MetallicRoughness, "metallic_roughness"),
+        (Map::Normal, "normal"),
+        (Map::Occlusion, "occlusion"),
+        (Map::Emissive, "emissive"),
+        (Map::Clearcoat, "clearcoat"),
+        (Map::ClearcoatRoughness, "clearcoat_roughness"),
+        (Map::ClearcoatNormal, "clearcoat_normal"),
+        (Map::SheenColor, "sheen_color"),
+        (Map::SheenRoughness, "sheen_roughness"),
+        (Map::Specular, "specular"),
+        (Map::SpecularColor, "specular_color"),
+        (Map::Transmission, "transmission"),
+    ];
+
+    /// The map named `name`, as `base_color`.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.iter().find(|(_, candidate)| *candidate == name).map(|(map, _)| *map)
+    }
+
+    /// The material's texture for it.
+    pub fn of(self, material: &Material) -> Option<TextureRef> {
+        match self {
+            Map::BaseColor => material.base_color_texture,
+            Map::MetallicRoughness => material.metallic_roughness_texture,
+            Map::Normal => material.normal_texture,
+            Map::Occlusion => material.occlusion_texture,
+            Map::Emissive => material.emissive_texture,
+            Map::Clearcoat => material.clearcoat_texture,
+            Map::ClearcoatRoughness => material.clearcoat_roughness_texture,
+            Map::ClearcoatNormal => material.clearcoat_normal_texture,
+            Map::SheenColor => material.sheen_color_texture,
+            Map::SheenRoughness => material.sheen_roughness_texture,
+            Map::Specular => material.specular_texture,
+            Map::SpecularColor => material.specular_color_texture,
+            Map::Transmission => material.transmission_texture,
+        }
+    }
+
+    /// Whether it holds tangent-space directions, whose neutral texel is (0.5, 0.5, 1) and not white.
+    pub fn is_normal(self) -> bool {
+        matches!(self, Map::Normal | Map::ClearcoatNormal)
+    }
+}
+
+/// Something Kiln can bind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Slot {
+    Frame,
+    EnvSkybox,
+    EnvIrradiance,
+    EnvSpecular,
+    LutGgx,
+    HdrColor,
+    EnvSampler,
+    LutSampler,
+    Material,
+    MaterialTexture(Map),
+    MaterialSampler(Map),
+    Draw,
+}
+
+const FIXED: [(Slot, &str); 10] = [
+    (Slot::Frame, "frame"),
+    (Slot::EnvSkybox, "env_skybox"),
+    (Slot::EnvIrradiance, "env_irradiance"),
+    (Slot::EnvSpecular, "env_specular"),
+    (Slot::LutGgx, "lut_ggx"),
+    (Slot::HdrColor, "hdr_color"),
+    (Slot::EnvSampler, "env_sampler"),
+    (Slot::LutSampler, "lut_sampler"),
+    (Slot::Material, "material"),
+    (Slot::Draw, "draw"),
+];
+
+impl Slot {
+    /// The slot of a shader variable's name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        let fixed = FIXED.iter().find(|(_, candidate)| *candidate == name).map(|(slot, _)| *slot);
+        let texture = || name.strip_suffix("_texture").and_then(Map::from_name).map(Slot::MaterialTexture);
+        let sampler = || name.strip_suffix("_sampler").and_then(Map::from_name).map(Slot::MaterialSampler);
+        fixed.or_else(texture).or_else(sampler)
+    }
+
+    /// The bind group it belongs to: 0 frame, 1 material, 2 draw.
+    pub fn group(self) -> u32 {
+        match self {
+            Slot::Material | Slot::MaterialTexture(_) | Slot::MaterialSampler(_) => 1,
+            Slot::Draw => 2,
+            _ => 0,
+        }
+    }
+
+    /// Whether a binding of this kind can hold it.
+    pub fn accepts(self, kind: &BindingKind) -> bool {
+        match (self.expects(), kind) {
+            ("uniform", BindingKind::Uniform { .. }) => true,
+            ("sampler", BindingKind::Sampler { comparison }) => !comparison,
+            (expected, BindingKind::Texture { dimension, sample, multisampled: false })
+                if sample == "float" =>
+            {
+                expected.strip_prefix("texture_").and_then(|rest| rest.strip_suffix("<f32>"))
+                    == Some(dimension)
+            }
+            _ => false,
+        }
+    }
+
+    /// What a shader must declare it as.
+    pub fn expects(self) -> &'static str {
+        match self {
+            Slot::Frame | Slot::Material | Slot::Draw => "uniform",
+            Slot::EnvSkybox | Slot::EnvIrradiance | Slot::EnvSpecular => "texture_cube<f32>",
+            Slot::LutGgx | Slot::HdrColor | Slot::MaterialTexture(_) => "texture_2d<f32>",
+            Slot::EnvSampler | Slot::LutSampler | Slot::MaterialSampler(_) => "sampler",
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! Revisions made by hand, with the real shaders.
+
+use std::collections::{BTreeSet, HashMap};
+use std::path::PathBuf;
+use std::sync::{Arc, OnceLock};
+
+use half::f16;
+use kiln_build::Digest;
+use kiln_gpu::{Gpu, GpuError};
+use kiln_link::{Part, Revision, RevisionTable, Target, TargetState};
+use serde_json::{Value, json};
+
+/// Six radiances in KTX2 face order: +X red, −X cyan, +Y green, −Y magenta, +Z blue, −Z yellow.
+pub const SIX_COLORS: [[f32; 3]; 6] =
+    [[0.5, 0.0, 0.0], [0.0, 0.5, 0.5], [0.0, 0.5, 0.0], [0.5, 0.0, 0.5], [0.0, 0.0, 0.5], [0.5, 0.5, 0.0]];
+
+/// A device, or `None` with a loud line; with `KILN_REQUIRE_GPU=1` a missing device fails.
+#[expect(clippy::print_stderr, reason = "a skipped test says so")]
+pub fn gpu() -> Option<Gpu> {
+    // One device for all tests: opening one costs more than most of them.
+    static GPU: OnceLock<Result<Gpu, GpuError>> = OnceLock::new();
+    match GPU.get_or_init(Gpu::headless) {
+        Ok(gpu) => Some(gpu.clone()),
+        Err(error) if std::env::var_os("KILN_REQUIRE_GPU").is_some() => panic!("{error}"),
+        Err(error) => {
+            eprintln!("SKIPPED: {error}");
+            None
+        }
+    }
+}
+
+/// A revision that grows target by target.
+#[derive(Clone, Default)]
+pub struct Build {
+    pub table: RevisionTable,
+    blobs: HashMap<Digest, Arc<[u8]>>,
+}
+
+impl Build {
+    /// An empty revision 1.
+    pub fn new() -> Self {
+        Build { table: RevisionTable { number: 1, ..Default::default() }, ..Default::default() }
+    }
+
+    /// Shaders, table, one environment `sky` of six colours, one scene `ball`.
+    pub fn ball(material: Value) -> Self {
+        let mut build = Build::new();
+        build.shaders(&[&[]]).lut().env("sky", SIX_COLORS).scene("ball", "sky", sphere_glb(material));
+        build
+    }
+
+    pub fn target(&mut self, name: &str, kind: &str, meta: Value, parts: &[(&str, Vec<u8>)]) -> &mut Self {
+        let parts = parts.iter().map(|(part, bytes)| {
+            let digest = Digest::of(bytes);
+            self.blobs.insert(digest, bytes.as_slice().into());
+            Part { name: (*part).to_owned(), digest, bytes: bytes.len() as u64 }
+        });
+        let target =
+            Target { kind: kind.to_owned(), state: TargetState::Fresh, meta, parts: parts.collect() };
+        self.table.targets.insert(name.to_owned(), target);
+        self
+    }
+
+    /// The project's own shaders, `pbr` with each of the feature sets.
+    pub fn shaders(&mut self, feature_sets: &[&[&str]]) -> &mut Self {
+        for features in feature_sets {
+            self.shader("pbr", "material", "pbr/pbr.wgsl", features);
+        }
+        self.shader("background", "background", "pbr/background.wgsl", &[]);
+        self.shader("tonemap", "tonemap", "pbr/tonemap.wgsl", &[])
+    }
+
+    pub fn shader(&mut self, name: &str, role: &str, root: &str, features: &[&str]) -> &mut Self {
+        let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shaders");
+        self.shader_from(name, role, root, features, &mut |path| {
+            std::fs::read_to_string(folder.join(path)).ok().map(Arc::from)
+        })
+    }
+
+    /// Compiles one module that imports nothing.
+    pub fn shader_text(&mut self, name: &str, role: &str, text: &str) -> &mut Self {
+        self.shader_from(name, role, "test.wgsl", &[], &mut |path| {
+            (path == "test.wgsl").then(|| Arc::from(text))
+        })
+    }
+
+    fn shader_from(
+        &mut self,
+        name: &str,
+        role: &str,
+        root: &str,
+        features: &[&str],
+        read: &mut dyn FnMut(&str) -> Option<Arc<str>>,
+    ) -> &mut Self {
+        let set: BTreeSet<String> = features.iter().map(|feature| (*feature).to_owned()).collect();
+        let outcome = kiln_shader::compile(root, &set, read);
+        let compiled = outcome.compiled.unwrap_or_else(|| panic!("{root}: {:?}", outcome.diagnostics));
+        let variant = if features.is_empty() { "base".to_owned() } else { features.join("+") };
+        let reflection = serde_json::to_vec(&compiled.reflection).expect("a reflection is plain data");
+        let parts = [("wgsl", compiled.wgsl.into_bytes()), ("reflection", reflection)];
+        let meta = json!({ "shader": name, "role": role, "features": features });
+        self.target(&format!("shader/{name}/{variant}"), "shader", meta, &parts)
+    }
+
+    /// An environment whose faces have one radiance each: all three maps are that cube.
+    pub fn env(&mut self, name: &str, faces: [[f32; 3]; 6]) -> &mut Self {
+        for map in ["skybox", "irradiance", "specular"] {
+            self.cube(&format!("env/{name}/{map}"), 4, 3, 0, faces);
+        }
+        self
+    }
+
+    pub fn cube(
+        &mut self,
+        name: &str,
+        size: u32,
+        levels: u32,
+        scale_log2: i32,
+        faces: [[f32; 3]; 6],
+    ) -> &mut Self {
+        let level = |level: u32| {
+            let texels = (size >> level).pow(2) as usize;
+            let texel =
+                |[r, g, b]: [f32; 3]| [r, g, b, 1.0].map(f16::from_f32).map(f16::to_le_bytes).concat();
+            (format!("mip{level}"), faces.iter().flat_map(|face| texel(*face).repeat(texels)).collect())
+        };
+        let parts: Vec<(String, Vec<u8>)> = (0..levels).map(level).collect();
+        let parts: Vec<(&str, Vec<u8>)> =
+            parts.iter().map(|(name, bytes)| (name.as_str(), bytes.clone())).collect();
+        let meta = json!({ "size": size, "levels": levels, "format": "rgba16f", "scale_log2": scale_log2 });
+        self.target(name, "cube", meta, &parts)
+    }
+
+    /// Lazarov's fit of the split-sum table: smooth, plausible, and not constant.
+    pub fn lut(&mut self) -> &mut Self {
+        const SIZE: usize = 32;
+        let texel = |index: usize| {
+            let at = |step: usize| (step as f32 + 0.5) / SIZE as f32;
+            let (n_dot_v, roughness) = (at(index % SIZE), at(index / SIZE));
+            let (x, y) = (1.0 - roughness, 0.0425 - 0.0275 * roughness);
+            let a = (x * x).min((-9.28 * n_dot_v).exp2()) * x + y;
+            let (scale, bias) = (1.04 - 0.572 * roughness - 1.04 * a, 0.022 * roughness - 0.04 + 1.04 * a);
+            [scale.clamp(0.0, 1.0), bias.clamp(0.0, 1.0)].map(f32::to_le_bytes).concat()
+        };
+        let texels: Vec<u8> = (0..SIZE * SIZE).flat_map(texel).collect();
+        self.target("lut/ggx", "lut", json!({ "size": SIZE, "format": "rg32f" }), &[("texels", texels)])
+    }
+
+    pub fn scene(&mut self, name: &str, env: &str, glb: Vec<u8>) -> &mut Self {
+        let meta = json!({ "env": env, "shader": "pbr", "notes": [] });
+        self.target(&format!("scene/{name}"), "scene", meta, &[("glb", glb)])
+    }
+
+    pub fn revision(&self) -> Revision {
+        Revision::new(self.table.clone(), self.blobs.clone()).expect("every part has its blob")
+    }
+}
+
+/// A unit sphere at the origin with one material, as a GLB that went through `kiln_scene::pack`.
+pub fn sphere_glb(material: Value) -> Vec<u8> {
+    const RINGS: u32 = 96;
+    const SEGMENTS: u32 = 192;
+    let mut positions: Vec<f32> = Vec::new();
+    for ring in 0..=RINGS {
+        let theta = std::f32::consts::PI * ring as f32 / RINGS as f32;
+        for segment in 0..=SEGMENTS {
+            let phi = std::f32::consts::TAU * segment as f32 / SEGMENTS as f32;
+            positions.extend([theta.sin() * phi.sin(), theta.cos(), theta.sin() * phi.cos()]);
+        }
+    }
+    let mut indices: Vec<u32> = Vec::new();
+    for ring in 0..RINGS {
+        for segment in 0..SEGMENTS {
+            let a = ring * (SEGMENTS + 1) + segment;
+            let b = a + SEGMENTS + 1;
+            indices.extend([a, b, a + 1, a + 1, b, b + 1]);
+        }
+    }
+    let (vertex_count, vertex_bytes) = (positions.len() / 3, positions.len() * 4);
+    let document = json!({
+        "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0, "NORMAL": 0 }, "indices": 1, "material": 0 }] }],
+        "materials": [material],
+        "buffers": [{ "byteLength": vertex_bytes + indices.len() * 4 }],
+        "bufferViews": [
+            { "buffer": 0, "byteLength": vertex_bytes },
+            { "buffer": 0, "byteOffset": vertex_bytes, "byteLength": indices.len() * 4 },
+        ],
+        "accessors": [
+            { "bufferView": 0, "componentType": 5126, "count": vertex_count, "type": "VEC3",
+              "min": [-1.0, -1.0, -1.0], "max": [1.0, 1.0, 1.0] },
+            { "bufferView": 1, "componentType": 5125, "count": indices.len(), "type": "SCALAR" },
+        ],
+    });
+    let binary = [bytemuck::cast_slice(&positions), bytemuck::cast_slice(&indices)].concat();
+    let packed = kiln_scene::pack("sphere.glb", &glb(&document, &binary), &mut |_| None);
+    packed.glb.unwrap_or_else(|| panic!("{:?}", packed.diagnostics)).to_vec()
+}
+
+/// glTF 2.0, section 4: header, JSON chunk, binary chunk.
+fn glb(document: &Value, binary: &[u8]) -> Vec<u8> {
+    let mut json = document.to_string().into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let word = |value: usize| (value as u32).to_le_bytes();
+    let total = 12 + 8 + json.len() + 8 + binary.len();
+    let header = [*b"glTF", word(2), word(total), word(json.len()), *b"JSON"].concat();
+    [header, json, [word(binary.len()), *b"BIN\0"].concat(), binary.to_vec()].concat()
+}

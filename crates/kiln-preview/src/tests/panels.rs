@@ -1,0 +1,110 @@
+//! The panels, driven as a user drives them.
+
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
+use kiln_diagnostic::Diagnostic;
+use kiln_link::{ActionTime, RevisionTable, Work};
+
+use crate::panel::{self, Connection, PanelState};
+use crate::theme;
+use crate::{Selection, View};
+
+fn state() -> PanelState {
+    let mut state = PanelState::new("llvmpipe, Vulkan".to_owned(), Selection::default(), View::default());
+    state.connection = Connection::Connected;
+    state.project = "demo".to_owned();
+    state.report.revision = 7;
+    state.report.scenes = vec!["ball".to_owned(), "car".to_owned()];
+    state.report.envs = vec!["sky".to_owned(), "studio".to_owned()];
+    state.report.shown = Selection { scene: Some("ball".to_owned()), env: Some("sky".to_owned()) };
+    state
+}
+
+fn harness(state: PanelState) -> Harness<'static, PanelState> {
+    let show = |ui: &mut egui::Ui, state: &mut PanelState| {
+        theme::apply(ui.ctx());
+        panel::show(ui, state, |_, _| ());
+    };
+    let mut harness = Harness::builder().with_size([1280.0, 800.0]).build_ui_state(show, state);
+    harness.run_steps(4);
+    harness
+}
+
+#[test]
+fn picking_an_environment_changes_the_selection() {
+    let mut harness = harness(state());
+    assert!(harness.query_by_label("studio").is_none(), "the list is closed");
+    harness.get_by_label("environment").click();
+    harness.run_steps(4);
+    harness.get_by_label("studio").click();
+    harness.run_steps(4);
+    assert_eq!(harness.state().selection.env.as_deref(), Some("studio"));
+    assert_eq!(harness.state().selection.scene, None);
+}
+
+#[test]
+fn diagnostic_shows_message_place_source_and_caret() {
+    let mut state = state();
+    let text = "fn f() {\n\tlet x = n_dot_vv;\n}";
+    let at = text.find("n_dot_vv").expect("it is there");
+    let diagnostic = Diagnostic::error("no definition in scope for `n_dot_vv`")
+        .at("shaders/pbr/pbr.wgsl", text, at..at + 8)
+        .with_help("did you mean `n_dot_v`?");
+    state.receive(&RevisionTable { diagnostics: vec![diagnostic], ..Default::default() });
+    let harness = harness(state);
+    for label in [
+        "no definition in scope for `n_dot_vv`",
+        "shaders/pbr/pbr.wgsl:2:10",
+        "2 |     let x = n_dot_vv;",
+        "  |             ^^^^^^^^",
+        "help: did you mean `n_dot_v`?",
+        "1 error",
+    ] {
+        assert!(harness.query_by_label(label).is_some(), "`{label}` is not shown");
+    }
+}
+
+#[test]
+fn without_diagnostics_no_error_is_shown() {
+    let harness = harness(state());
+    assert!(harness.query_by_label("error").is_none());
+    assert!(harness.query_by_label("1 error").is_none());
+    assert!(harness.query_by_label("stale").is_none());
+}
+
+#[test]
+fn lost_daemon_is_said_and_a_daemon_never_seen_is_not_an_alarm() {
+    let mut lost = state();
+    lost.lose_connection("the daemon ended the connection".to_owned());
+    assert!(harness(lost).query_by_label("daemon gone, reconnecting").is_some());
+    let mut never = PanelState::new(String::new(), Selection::default(), View::default());
+    never.lose_connection("no daemon serves this project".to_owned());
+    assert!(harness(never).query_by_label("looking for a daemon").is_some());
+}
+
+#[test]
+fn stale_targets_and_build_times_are_shown() {
+    let mut state = state();
+    state.report.stale = vec!["shader/pbr/base".to_owned()];
+    let ran =
+        vec![ActionTime { name: "compile pbr".into(), wall_ms: 12.5, reason: "pbr.wgsl changed".into() }];
+    state.work = Work { ran, reused: 30, plan_ms: 1.0, run_ms: 13.0, ..Default::default() };
+    let harness = harness(state);
+    for label in ["stale", "compile pbr", "pbr.wgsl changed", "1 ran, 30 reused, plan 1.0 ms, run 13.0 ms"] {
+        assert!(harness.query_by_label(label).is_some(), "`{label}` is not shown");
+    }
+}
+
+#[test]
+fn choosing_another_scene_drops_the_camera_of_the_first() {
+    let mut state = state();
+    state.view.camera = Some(crate::OrbitCamera::BACKGROUND_ONLY);
+    state.selection.env = Some("studio".to_owned());
+    let mut harness = harness(state);
+    harness.get_by_label("scene").click();
+    harness.run_steps(4);
+    harness.get_by_label("car").click();
+    harness.run_steps(4);
+    assert_eq!(harness.state().selection, Selection { scene: Some("car".to_owned()), env: None });
+    assert_eq!(harness.state().view.camera, None);
+}

@@ -1,0 +1,186 @@
+//! Uniform blocks filled by member name, as `docs/shader-interface.md` lists them.
+
+use glam::{Mat3, Mat4, Vec3};
+use kiln_scene::{AlphaMode, Material, TextureRef};
+use kiln_shader::Member;
+
+use crate::slot::Map;
+
+/// A value that a uniform member can take.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Value {
+    F32(f32),
+    Vec2([f32; 2]),
+    Vec3([f32; 3]),
+    Vec4([f32; 4]),
+    Mat4([f32; 16]),
+}
+
+impl Value {
+    /// The one WGSL type that takes it.
+    pub fn wgsl_type(&self) -> &'static str {
+        match self {
+            Value::F32(_) => "f32",
+            Value::Vec2(_) => "vec2<f32>",
+            Value::Vec3(_) => "vec3<f32>",
+            Value::Vec4(_) => "vec4<f32>",
+            Value::Mat4(_) => "mat4x4<f32>",
+        }
+    }
+
+    fn floats(&self) -> &[f32] {
+        match self {
+            Value::F32(value) => std::slice::from_ref(value),
+            Value::Vec2(values) => values,
+            Value::Vec3(values) => values,
+            Value::Vec4(values) => values,
+            Value::Mat4(values) => values,
+        }
+    }
+}
+
+impl From<f32> for Value {
+    fn from(value: f32) -> Self {
+        Value::F32(value)
+    }
+}
+
+impl From<Mat4> for Value {
+    fn from(value: Mat4) -> Self {
+        Value::Mat4(value.to_cols_array())
+    }
+}
+
+/// What the whole frame shares.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct FrameValues {
+    pub clip_from_world: Mat4,
+    pub camera_position: Vec3,
+    pub exposure: f32,
+    pub environment_from_world: Mat4,
+    pub environment_intensity: f32,
+    pub specular_level_max: f32,
+    pub skybox_scale: f32,
+    pub irradiance_scale: f32,
+    pub specular_scale: f32,
+    pub background_blur: f32,
+    pub viewport_size: [f32; 2],
+    pub time_s: f32,
+}
+
+impl FrameValues {
+    /// The value of a member of `frame`; `None` for unknown names.
+    pub fn member(&self, name: &str) -> Option<Value> {
+        Some(match name {
+            "clip_from_world" => self.clip_from_world.into(),
+            "world_from_clip" => self.clip_from_world.inverse().into(),
+            "camera_position" => Value::Vec3(self.camera_position.to_array()),
+            "exposure" => self.exposure.into(),
+            "environment_from_world" => self.environment_from_world.into(),
+            "environment_intensity" => self.environment_intensity.into(),
+            "specular_level_max" => self.specular_level_max.into(),
+            "skybox_scale" => self.skybox_scale.into(),
+            "irradiance_scale" => self.irradiance_scale.into(),
+            "specular_scale" => self.specular_scale.into(),
+            "background_blur" => self.background_blur.into(),
+            "viewport_size" => Value::Vec2(self.viewport_size),
+            "time_s" => self.time_s.into(),
+            _ => return None,
+        })
+    }
+}
+
+/// The value of a member of `material`; `None` for unknown names.
+pub(crate) fn material_member(material: &Material, name: &str) -> Option<Value> {
+    Some(match name {
+        "base_color_factor" => Value::Vec4(material.base_color_factor),
+        "metallic_factor" => material.metallic_factor.into(),
+        "roughness_factor" => material.roughness_factor.into(),
+        "emissive_factor" => Value::Vec3(material.emissive_factor),
+        "normal_scale" => material.normal_scale.into(),
+        "occlusion_strength" => material.occlusion_strength.into(),
+        "alpha_cutoff" => alpha_cutoff(material).into(),
+        "ior" => material.ior.into(),
+        "specular_factor" => material.specular_factor.into(),
+        "specular_color_factor" => Value::Vec3(material.specular_color_factor),
+        "clearcoat_factor" => material.clearcoat_factor.into(),
+        "clearcoat_roughness_factor" => material.clearcoat_roughness_factor.into(),
+        "clearcoat_normal_scale" => material.clearcoat_normal_scale.into(),
+        "sheen_color_factor" => Value::Vec3(material.sheen_color_factor),
+        "sheen_roughness_factor" => material.sheen_roughness_factor.into(),
+        "transmission_factor" => material.transmission_factor.into(),
+        _ => return uv_member(material, name),
+    })
+}
+
+fn alpha_cutoff(material: &Material) -> f32 {
+    match material.alpha_mode {
+        AlphaMode::Mask { cutoff } => cutoff,
+        AlphaMode::Opaque | AlphaMode::Blend => 0.0,
+    }
+}
+
+/// `X_uv_u` and `X_uv_v`: the rows of the texture's affine map, the UV set in `X_uv_u.w`.
+fn uv_member(material: &Material, name: &str) -> Option<Value> {
+    let (map, row) = match (name.strip_suffix("_uv_u"), name.strip_suffix("_uv_v")) {
+        (Some(map), _) => (map, 0),
+        (_, Some(map)) => (map, 1),
+        _ => return None,
+    };
+    let identity = TextureRef { texture: 0, uv_set: 0, transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] };
+    let texture = Map::from_name(map)?.of(material).unwrap_or(identity);
+    let [x, y, z] = texture.transform[row];
+    let set = if row == 0 { texture.uv_set as f32 } else { 0.0 };
+    Some(Value::Vec4([x, y, z, set]))
+}
+
+/// The value of a member of `draw`; `None` for unknown names.
+pub(crate) fn draw_member(world_from_object: Mat4, name: &str) -> Option<Value> {
+    match name {
+        "world_from_object" => Some(world_from_object.into()),
+        "world_from_object_normal" => Some(normal_matrix(world_from_object).into()),
+        _ => None,
+    }
+}
+
+/// The inverse transpose up to a positive factor, finite for singular matrices too: cofactors with the
+/// determinant's sign, scaled to unit range. Normals are normalised after it, so the factor cancels.
+fn normal_matrix(world_from_object: Mat4) -> Mat4 {
+    let linear = Mat3::from_mat4(world_from_object);
+    let (x, y, z) = (linear.x_axis, linear.y_axis, linear.z_axis);
+    let largest = x.abs().max(y.abs()).max(z.abs()).max_element();
+    if !(largest > 0.0 && largest.is_finite()) {
+        return Mat4::IDENTITY;
+    }
+    let (x, y, z) = (x / largest, y / largest, z / largest);
+    let sign = if x.dot(y.cross(z)) < 0.0 { -1.0 } else { 1.0 };
+    Mat4::from_mat3(Mat3::from_cols(y.cross(z) * sign, z.cross(x) * sign, x.cross(y) * sign))
+}
+
+/// The bytes of a uniform block of `size_bytes`: each member that `lookup` knows at its offset, zeros elsewhere.
+/// Members were checked against `lookup` when the shader was accepted.
+pub(crate) fn fill_block(
+    size_bytes: u32,
+    members: &[Member],
+    lookup: impl Fn(&str) -> Option<Value>,
+) -> Vec<u8> {
+    let mut block = vec![0; size_bytes as usize];
+    for member in members {
+        let Some(value) = lookup(&member.name) else { continue };
+        let bytes: &[u8] = bytemuck::cast_slice(value.floats());
+        let start = member.offset_bytes as usize;
+        if let Some(place) = block.get_mut(start..start + bytes.len()) {
+            place.copy_from_slice(bytes);
+        }
+    }
+    block
+}
+
+/// Spells WGSL's short names of types out: `vec3f` is `vec3<f32>`.
+pub(crate) fn long_type_name(ty: &str) -> String {
+    let shortened = ty.starts_with("vec") || ty.starts_with("mat");
+    match ty.strip_suffix('f') {
+        Some(stem) if shortened && !ty.contains('<') => format!("{stem}<f32>"),
+        _ => ty.replace(' ', ""),
+    }
+}

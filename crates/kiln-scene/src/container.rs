@@ -1,0 +1,97 @@
+//! The GLB container (glTF 2.0, section 4.4): a header, a JSON chunk, an optional binary chunk.
+
+use crate::SceneError;
+
+const MAGIC: &[u8; 4] = b"glTF";
+const CHUNK_JSON: &[u8; 4] = b"JSON";
+const CHUNK_BIN: &[u8; 4] = b"BIN\0";
+const HEADER_BYTES: usize = 12;
+const CHUNK_HEADER_BYTES: usize = 8;
+
+/// JSON text and binary payload of a file.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Container<'a> {
+    pub json: &'a [u8],
+    pub bin: Option<&'a [u8]>,
+    /// Whether it is a GLB; else the JSON is the file itself.
+    pub binary: bool,
+}
+
+/// Splits a .glb, or takes a .gltf as it is.
+pub(crate) fn open(bytes: &[u8]) -> Result<Container<'_>, SceneError> {
+    if !bytes.starts_with(MAGIC) {
+        return Ok(Container { json: bytes, bin: None, binary: false });
+    }
+    let (version, length) = (u32_at(bytes, 4)?, u32_at(bytes, 8)? as usize);
+    if version != 2 {
+        return Err(fault(4, format!("GLB version {version} is not supported, only 2"))
+            .with_help("export it again as glTF 2.0"));
+    }
+    if length > bytes.len() {
+        return Err(fault(8, format!("the header says {length} bytes, the file has {}", bytes.len())));
+    }
+    let (json, mut at) = chunk(bytes, HEADER_BYTES, CHUNK_JSON)?
+        .ok_or_else(|| fault(HEADER_BYTES, "the first chunk must be JSON".into()))?;
+    // Unknown chunks may stand between; a file without the binary chunk is complete.
+    while at + CHUNK_HEADER_BYTES <= length {
+        if let Some((bin, _)) = chunk(bytes, at, CHUNK_BIN)? {
+            return Ok(Container { json, bin: Some(bin), binary: true });
+        }
+        at = chunk_end(bytes, at)?;
+    }
+    Ok(Container { json, bin: None, binary: true })
+}
+
+/// Joins JSON and payload into a GLB, both padded to four bytes as the format demands.
+pub(crate) fn join(json: &[u8], bin: &[u8]) -> Vec<u8> {
+    let padded = |length: usize| length.next_multiple_of(4);
+    let bin_bytes = if bin.is_empty() { 0 } else { CHUNK_HEADER_BYTES + padded(bin.len()) };
+    let total = HEADER_BYTES + CHUNK_HEADER_BYTES + padded(json.len()) + bin_bytes;
+    let mut out = Vec::with_capacity(total);
+    out.extend_from_slice(MAGIC);
+    out.extend_from_slice(&2u32.to_le_bytes());
+    out.extend_from_slice(&length_field(total).to_le_bytes());
+    push_chunk(&mut out, CHUNK_JSON, json, b' ');
+    if !bin.is_empty() {
+        push_chunk(&mut out, CHUNK_BIN, bin, 0);
+    }
+    out
+}
+
+fn push_chunk(out: &mut Vec<u8>, kind: &[u8; 4], data: &[u8], pad: u8) {
+    out.extend_from_slice(&length_field(data.len().next_multiple_of(4)).to_le_bytes());
+    out.extend_from_slice(kind);
+    out.extend_from_slice(data);
+    out.resize(out.len().next_multiple_of(4), pad);
+}
+
+/// The limits on vertices, indices and images keep a pack below the 4 GiB that the format can say.
+fn length_field(length: usize) -> u32 {
+    u32::try_from(length).unwrap_or(u32::MAX)
+}
+
+/// The chunk at `at` and where it ends, if it has the given kind.
+fn chunk<'a>(bytes: &'a [u8], at: usize, kind: &[u8; 4]) -> Result<Option<(&'a [u8], usize)>, SceneError> {
+    let end = chunk_end(bytes, at)?;
+    let found = &bytes[at + 4..at + CHUNK_HEADER_BYTES] == kind;
+    Ok(found.then(|| (&bytes[at + CHUNK_HEADER_BYTES..end], end)))
+}
+
+fn chunk_end(bytes: &[u8], at: usize) -> Result<usize, SceneError> {
+    let length = u32_at(bytes, at)? as usize;
+    let end = at + CHUNK_HEADER_BYTES + length;
+    if end > bytes.len() {
+        let left = bytes.len().saturating_sub(at + CHUNK_HEADER_BYTES);
+        return Err(fault(at, format!("a chunk of {length} bytes does not fit the {left} bytes left")));
+    }
+    Ok(end)
+}
+
+fn u32_at(bytes: &[u8], at: usize) -> Result<u32, SceneError> {
+    let four = bytes.get(at..at + 4).and_then(|four| four.try_into().ok());
+    four.map(u32::from_le_bytes).ok_or_else(|| fault(at, "the file ends inside a GLB header".into()))
+}
+
+fn fault(at: usize, reason: String) -> SceneError {
+    SceneError::new("", format!("byte {at}: {reason}"))
+}

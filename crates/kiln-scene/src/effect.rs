@@ -1,0 +1,64 @@
+//! Names of effects and of their sets.
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use crate::{Effect, EffectSet};
+
+impl Effect {
+    /// Every effect, in the order of their names.
+    pub const ALL: [Effect; 11] = [
+        Effect::AlphaBlend,
+        Effect::AlphaMask,
+        Effect::Clearcoat,
+        Effect::Emission,
+        Effect::NormalMap,
+        Effect::Occlusion,
+        Effect::Sheen,
+        Effect::Specular,
+        Effect::Transmission,
+        Effect::Unlit,
+        Effect::VertexColor,
+    ];
+
+    /// The feature that a shader is compiled with.
+    pub fn name(self) -> &'static str {
+        match self {
+            Effect::AlphaBlend => "alpha_blend",
+            Effect::AlphaMask => "alpha_mask",
+            Effect::Clearcoat => "clearcoat",
+            Effect::Emission => "emission",
+            Effect::NormalMap => "normal_map",
+            Effect::Occlusion => "occlusion",
+            Effect::Sheen => "sheen",
+            Effect::Specular => "specular",
+            Effect::Transmission => "transmission",
+            Effect::Unlit => "unlit",
+            Effect::VertexColor => "vertex_color",
+        }
+    }
+
+    /// The effect of that [`name`](Effect::name).
+    pub fn from_name(name: &str) -> Option<Effect> {
+        Effect::ALL.into_iter().find(|effect| effect.name() == name)
+    }
+}
+
+/// Name of the shader variant: the effects' names in alphabetical order joined by `+`, or `base` for none.
+pub fn variant_name(effects: &EffectSet) -> String {
+    let mut names: Vec<&str> = effects.iter().map(|effect| effect.name()).collect();
+    names.sort_unstable();
+    if names.is_empty() { "base".into() } else { names.join("+") }
+}
+
+impl Serialize for Effect {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+impl<'de> Deserialize<'de> for Effect {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        Effect::from_name(&name).ok_or_else(|| serde::de::Error::custom(format!("unknown effect `{name}`")))
+    }
+}

@@ -1,0 +1,116 @@
+//! Which glTF extensions are known, and what is said about the others.
+
+use crate::SceneError;
+use crate::schema::{Material, Root};
+
+/// Drawn, or harmless to a picture. Texture formats are absent although a fallback of theirs may be drawn:
+/// a file that requires them has none.
+const SUPPORTED: &[&str] = &[
+    "EXT_mesh_gpu_instancing",
+    "KHR_lights_punctual",
+    "KHR_materials_clearcoat",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_variants",
+    "KHR_mesh_quantization",
+    "KHR_node_visibility",
+    "KHR_texture_transform",
+    // Metadata: nothing to draw.
+    "EXT_mesh_features",
+    "EXT_mesh_manifold",
+    "EXT_structural_metadata",
+    "FB_ngon_encoding",
+    "KHR_xmp",
+    "KHR_xmp_json_ld",
+];
+
+/// Noted by value where a drawn material has them, see [`material_notes`]; or where data is missing.
+const NOTED_ELSEWHERE: &[&str] = &[
+    "EXT_meshopt_compression",
+    "EXT_texture_webp",
+    "KHR_animation_pointer",
+    "KHR_draco_mesh_compression",
+    "KHR_materials_anisotropy",
+    "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",
+    "KHR_materials_iridescence",
+    "KHR_materials_volume",
+    "KHR_meshopt_compression",
+    "KHR_texture_basisu",
+];
+
+/// Refuses a file that cannot be drawn right without an extension that is not known.
+///
+/// # Errors
+/// The first required extension that is not supported, by name.
+pub(crate) fn check_required(root: &Root) -> Result<(), SceneError> {
+    let unknown = root.extensions_required.iter().position(|name| !SUPPORTED.contains(&name.as_str()));
+    let Some(at) = unknown else { return Ok(()) };
+    let name = &root.extensions_required[at];
+    let help = if name.contains("draco") || name.contains("meshopt") {
+        "export the file without mesh compression"
+    } else if name.contains("texture") {
+        "export the textures as PNG or JPEG"
+    } else {
+        "export the file without this extension"
+    };
+    let reason = format!("the file requires the extension {name}, which is not supported");
+    Err(SceneError::new(format!("/extensionsRequired/{at}"), reason).with_help(help))
+}
+
+/// Sentences about the file as a whole.
+pub(crate) fn file_notes(root: &Root) -> Vec<String> {
+    let mut notes = Vec::new();
+    let known =
+        |name: &&String| !SUPPORTED.contains(&name.as_str()) && !NOTED_ELSEWHERE.contains(&name.as_str());
+    for name in root.extensions_used.iter().filter(known) {
+        notes.push(format!("the extension {name} is not supported and was ignored"));
+    }
+    if !root.animations.is_empty() {
+        notes.push(format!("{} animations: the rest pose is drawn", root.animations.len()));
+    }
+    if root.extensions_used.iter().any(|name| name == "KHR_materials_variants") {
+        notes.push("KHR_materials_variants: the default variant is drawn".into());
+    }
+    notes
+}
+
+/// What a drawn material asks for and does not get as the specification says.
+pub(crate) fn material_notes(name: &str, material: &Material) -> Vec<String> {
+    let ext = &material.extensions;
+    if ext.unlit.is_some() {
+        return Vec::new();
+    }
+    let asked = [
+        (ext.anisotropy.is_some_and(|it| it.anisotropy_strength != 0.0), "anisotropy is not drawn"),
+        (ext.iridescence.is_some_and(|it| it.iridescence_factor > 0.0), "iridescence is not drawn"),
+        (ext.volume.is_some_and(|it| it.thickness_factor > 0.0), "volume is not drawn: it is thin-walled"),
+        (ext.dispersion.is_some_and(|it| it.dispersion > 0.0), "dispersion is not drawn"),
+        (
+            ext.diffuse_transmission.is_some_and(|it| it.diffuse_transmission_factor > 0.0),
+            "diffuse transmission is not drawn",
+        ),
+        (
+            ext.transmission.as_ref().is_some_and(|it| it.transmission_factor > 0.0),
+            "transmission is approximated: only the environment shows through",
+        ),
+        (ext.specular_glossiness.is_some(), "specular-glossiness was converted to metallic-roughness"),
+    ];
+    let asked = asked.into_iter().filter(|(is_asked, _)| *is_asked);
+    asked.map(|(_, what)| format!("material `{name}`: {what}")).collect()
+}
+
+/// Takes out what [`material_notes`] spoke of and nothing draws.
+pub(crate) fn forget_noted(material: &mut Material) {
+    let ext = &mut material.extensions;
+    ext.anisotropy = None;
+    ext.iridescence = None;
+    ext.volume = None;
+    ext.dispersion = None;
+    ext.diffuse_transmission = None;
+}

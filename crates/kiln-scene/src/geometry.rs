@@ -1,0 +1,303 @@
+//! Attributes of one primitive, morphed and skinned, as vertices.
+
+use std::collections::BTreeMap;
+
+use glam::{DMat3, DMat4, DVec3};
+
+use crate::accessor::Data;
+use crate::schema::Primitive;
+use crate::shape::Geometry;
+use crate::topology::{Topology, triangulate};
+use crate::{SceneError, Vertex, limits};
+
+/// Neutral values of absent attributes.
+pub(crate) const NEUTRAL: Vertex = Vertex {
+    position: [0.0; 3],
+    normal: [0.0, 0.0, 1.0],
+    tangent: [1.0, 0.0, 0.0, 1.0],
+    uv0: [0.0; 2],
+    uv1: [0.0; 2],
+    color: [1.0; 4],
+};
+
+/// What the material reads; the rest is neither read nor stored.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Needs {
+    pub normals: bool,
+    /// The normal texture's UV set and placement.
+    pub tangents: Option<crate::TextureRef>,
+    pub uv: [bool; 2],
+}
+
+/// How the primitive is deformed before it is placed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Deformation<'a> {
+    pub weights: &'a [f32],
+    pub placing: Placing<'a>,
+}
+
+/// How a primitive's vertices come to their place.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Placing<'a> {
+    /// By the draw's matrix.
+    Instance,
+    /// By joints (skin space to world for each): the vertices are in world space then.
+    Skin(&'a [DMat4]),
+    /// By a matrix that no draw can have, because it flattens and normals have no inverse of it.
+    Flattened(DMat4),
+}
+
+/// What reading may still cost; see [`limits::POSE_STEP_COUNT_MAX`].
+#[derive(Debug)]
+pub(crate) struct Budget {
+    pub steps_left: usize,
+}
+
+impl Budget {
+    fn spend(&mut self, steps: u64, pointer: &str) -> Result<(), SceneError> {
+        let left = usize::try_from(steps).ok().and_then(|steps| self.steps_left.checked_sub(steps));
+        let limit = limits::POSE_STEP_COUNT_MAX;
+        let fault = || {
+            SceneError::new(pointer, format!("the file's vertices, morphs and joints exceed {limit} steps"))
+        };
+        self.steps_left = left.ok_or_else(fault)?;
+        Ok(())
+    }
+}
+
+/// A primitive's geometry, or why there is nothing to draw.
+pub(crate) enum Read {
+    Geometry(Geometry),
+    Nothing(String),
+}
+
+/// Reads a primitive.
+///
+/// # Errors
+/// Accessors, indices or joints out of range, attributes of different lengths.
+pub(crate) fn read(
+    data: &Data<'_>,
+    primitive: &Primitive,
+    pointer: &str,
+    needs: Needs,
+    deformation: Deformation<'_>,
+    budget: &mut Budget,
+) -> Result<Read, SceneError> {
+    let Some(&position) = primitive.attributes.get("POSITION") else {
+        return Ok(Read::Nothing("it has no positions".into()));
+    };
+    if let Some(extension) = draco_only(data, primitive, position) {
+        return Err(SceneError::new(
+            pointer,
+            format!("{extension} is not supported and there is no other copy"),
+        )
+        .with_help("export the file without mesh compression"));
+    }
+    let count = data.count(position, &format!("{pointer}/attributes/POSITION"))?;
+    budget.spend(count, pointer)?;
+    let mut reader = Reader { data, primitive, pointer, count: count as usize };
+    let indices = match triangulate(primitive.mode.unwrap_or(4), reader.indices()?) {
+        Topology::Triangles(indices) if indices.is_empty() => {
+            return Ok(Read::Nothing("it has no triangles".into()));
+        }
+        Topology::Triangles(indices) => indices,
+        Topology::NotDrawn(what) => return Ok(Read::Nothing(format!("{what} are not drawn"))),
+        Topology::Unknown => return Err(SceneError::new(format!("{pointer}/mode"), "no mode of glTF 2.0")),
+    };
+    let mut geometry = reader.vertices(needs, indices)?;
+    reader.morph(&mut geometry, deformation.weights, budget)?;
+    match deformation.placing {
+        Placing::Instance => {}
+        Placing::Skin(joints) => reader.skin(&mut geometry, joints, budget)?,
+        Placing::Flattened(world) => {
+            let (normals, tangents) = (geometry.has_normals, geometry.has_tangents);
+            geometry.vertices.iter_mut().for_each(|vertex| deform(vertex, world, normals, tangents));
+        }
+    }
+    Ok(Read::Geometry(geometry))
+}
+
+fn draco_only<'a>(data: &Data<'_>, primitive: &'a Primitive, position: usize) -> Option<&'a str> {
+    let name = primitive.extensions.keys().find(|name| name.contains("draco"))?;
+    let accessor = data.root.accessors.get(position)?;
+    accessor.buffer_view.is_none().then_some(name.as_str())
+}
+
+struct Reader<'a, 'b> {
+    data: &'a Data<'b>,
+    primitive: &'a Primitive,
+    pointer: &'a str,
+    count: usize,
+}
+
+impl Reader<'_, '_> {
+    fn indices(&self) -> Result<Vec<u32>, SceneError> {
+        let Some(index) = self.primitive.indices else {
+            return Ok((0..self.count.min(limits::VERTEX_COUNT_MAX) as u32).collect());
+        };
+        let user = format!("{}/indices", self.pointer);
+        let indices: Vec<u32> =
+            self.data.unsigned::<1>(index, &user, &["SCALAR"])?.into_iter().flatten().collect();
+        match indices.iter().position(|&index| index as usize >= self.count) {
+            None => Ok(indices),
+            Some(at) => Err(SceneError::new(
+                user,
+                format!("index {} (number {at}) is outside the {} vertices", indices[at], self.count),
+            )),
+        }
+    }
+
+    fn attribute<const N: usize>(
+        &self,
+        attributes: &BTreeMap<String, usize>,
+        place: &str,
+        name: &str,
+        kinds: &[&str],
+        fill: [f32; N],
+    ) -> Result<Option<Vec<[f32; N]>>, SceneError> {
+        let Some(&index) = attributes.get(name) else { return Ok(None) };
+        let user = format!("{}{place}/{name}", self.pointer);
+        let values = self.data.floats(index, &user, kinds, fill)?;
+        self.check_count(values.len(), &user)?;
+        Ok(Some(values))
+    }
+
+    fn check_count(&self, actual: usize, user: &str) -> Result<(), SceneError> {
+        if actual == self.count {
+            return Ok(());
+        }
+        Err(SceneError::new(user, format!("{actual} elements for {} vertices", self.count)))
+    }
+
+    fn vertices(&mut self, needs: Needs, indices: Vec<u32>) -> Result<Geometry, SceneError> {
+        let attributes = &self.primitive.attributes;
+        let get =
+            |name, kinds: &[&str]| self.attribute::<4>(attributes, "/attributes", name, kinds, [1.0; 4]);
+        let positions = get("POSITION", &["VEC3"])?.unwrap_or_default();
+        let mut vertices: Vec<Vertex> =
+            positions.iter().map(|&[x, y, z, _]| Vertex { position: [x, y, z], ..NEUTRAL }).collect();
+        let normals = if needs.normals { get("NORMAL", &["VEC3"])? } else { None };
+        // Without normals the specification has given tangents ignored too.
+        let tangents = match (&normals, needs.tangents) {
+            (Some(_), Some(_)) => get("TANGENT", &["VEC4"])?,
+            _ => None,
+        };
+        let uv0 = if needs.uv[0] { get("TEXCOORD_0", &["VEC2"])? } else { None };
+        let uv1 = if needs.uv[1] { get("TEXCOORD_1", &["VEC2"])? } else { None };
+        let colors = get("COLOR_0", &["VEC3", "VEC4"])?;
+        for (at, vertex) in vertices.iter_mut().enumerate() {
+            if let Some(&[x, y, z, _]) = normals.as_ref().map(|normals| &normals[at]) {
+                vertex.normal = [x, y, z];
+            }
+            vertex.tangent = tangents.as_ref().map_or(vertex.tangent, |tangents| tangents[at]);
+            let uv =
+                |set: &Option<Vec<[f32; 4]>>| set.as_ref().map_or([0.0; 2], |set| [set[at][0], set[at][1]]);
+            (vertex.uv0, vertex.uv1) = (uv(&uv0), uv(&uv1));
+            vertex.color = colors.as_ref().map_or(vertex.color, |colors| colors[at]);
+        }
+        Ok(Geometry { vertices, indices, has_normals: normals.is_some(), has_tangents: tangents.is_some() })
+    }
+
+    /// Adds the default weights' share of each morph target (glTF 2.0, section 3.7.2.2).
+    fn morph(&self, geometry: &mut Geometry, weights: &[f32], budget: &mut Budget) -> Result<(), SceneError> {
+        let targets = self.primitive.targets.iter().zip(weights).enumerate();
+        for (at, (target, &weight)) in targets.filter(|(_, (_, weight))| **weight != 0.0) {
+            budget.spend(self.count as u64, self.pointer)?;
+            let place = format!("/targets/{at}");
+            let get = |name| self.attribute::<3>(target, &place, name, &["VEC3"], [0.0; 3]);
+            let (positions, normals, tangents) = (get("POSITION")?, get("NORMAL")?, get("TANGENT")?);
+            for (at, vertex) in geometry.vertices.iter_mut().enumerate() {
+                add(&mut vertex.position, positions.as_ref().map(|deltas| deltas[at]), weight);
+                if geometry.has_normals {
+                    add(&mut vertex.normal, normals.as_ref().map(|deltas| deltas[at]), weight);
+                }
+                if geometry.has_tangents {
+                    add(&mut vertex.tangent, tangents.as_ref().map(|deltas| deltas[at]), weight);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Moves vertices by the weighted joint matrices (glTF 2.0, section 3.7.3.3).
+    fn skin(&self, geometry: &mut Geometry, joints: &[DMat4], budget: &mut Budget) -> Result<(), SceneError> {
+        let influences = self.influences(joints.len(), budget)?;
+        for (vertex, influence) in geometry.vertices.iter_mut().zip(&influences) {
+            let total: f64 = influence.iter().map(|&(_, weight)| weight).sum();
+            // A vertex that no joint holds stays where it was modelled.
+            if !(total > 0.0 && total.is_finite()) {
+                continue;
+            }
+            let mut blend = DMat4::ZERO;
+            for &(joint, weight) in influence {
+                blend += joints[joint] * (weight / total);
+            }
+            deform(vertex, blend, geometry.has_normals, geometry.has_tangents);
+        }
+        Ok(())
+    }
+
+    /// Joint and weight pairs of each vertex, from all `JOINTS_n`/`WEIGHTS_n` sets.
+    fn influences(
+        &self,
+        joint_count: usize,
+        budget: &mut Budget,
+    ) -> Result<Vec<Vec<(usize, f64)>>, SceneError> {
+        let mut influences = vec![Vec::new(); self.count];
+        for set in 0.. {
+            let (joints_name, weights_name) = (format!("JOINTS_{set}"), format!("WEIGHTS_{set}"));
+            let attributes = &self.primitive.attributes;
+            let Some(&joints) = attributes.get(&joints_name) else { break };
+            let weights =
+                self.attribute::<4>(attributes, "/attributes", &weights_name, &["VEC4"], [0.0; 4])?;
+            let Some(weights) = weights else { break };
+            budget.spend(4 * self.count as u64, self.pointer)?;
+            let user = format!("{}/attributes/{joints_name}", self.pointer);
+            let joints = self.data.unsigned::<4>(joints, &user, &["VEC4"])?;
+            self.check_count(joints.len(), &user)?;
+            for (at, influence) in influences.iter_mut().enumerate() {
+                for (&joint, &weight) in
+                    joints[at].iter().zip(&weights[at]).filter(|(_, weight)| **weight != 0.0)
+                {
+                    if joint as usize >= joint_count {
+                        return Err(SceneError::new(
+                            user,
+                            format!("joint {joint} is outside the skin's {joint_count}"),
+                        ));
+                    }
+                    influence.push((joint as usize, f64::from(weight)));
+                }
+            }
+        }
+        Ok(influences)
+    }
+}
+
+fn add<const N: usize>(value: &mut [f32; N], delta: Option<[f32; 3]>, weight: f32) {
+    for (value, delta) in value.iter_mut().zip(delta.unwrap_or([0.0; 3])) {
+        *value += weight * delta;
+    }
+}
+
+/// Moves a vertex; normals and tangents that are absent keep their neutral values.
+fn deform(vertex: &mut Vertex, matrix: DMat4, has_normal: bool, has_tangent: bool) {
+    let wide = |values: [f32; 3]| DVec3::from_array(values.map(f64::from));
+    let narrow = |vector: DVec3| vector.to_array().map(|value| value as f32);
+    vertex.position = narrow(matrix.transform_point3(wide(vertex.position)));
+    let linear = DMat3::from_mat4(matrix);
+    if has_normal {
+        vertex.normal = narrow((cofactor(linear) * wide(vertex.normal)).normalize_or_zero());
+    }
+    if has_tangent {
+        let [x, y, z, handedness] = vertex.tangent;
+        let [x, y, z] = narrow((linear * wide([x, y, z])).normalize_or_zero());
+        vertex.tangent = [x, y, z, handedness];
+    }
+}
+
+/// Transforms normals like the inverse transpose, but exists for singular matrices too.
+fn cofactor(m: DMat3) -> DMat3 {
+    let cofactor =
+        DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
+    if m.determinant() < 0.0 { -cofactor } else { cofactor }
+}

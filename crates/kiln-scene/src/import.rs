@@ -1,0 +1,354 @@
+//! The one way from a document to a scene; [`crate::pack`] and [`crate::load`] both go it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use glam::{DMat3, DMat4, DVec3, Mat4};
+
+use crate::accessor::{Data, fetch_buffers};
+use crate::document::Document;
+use crate::geometry::{self, Budget, Deformation, Needs, Placing, Read};
+use crate::material_table::{MaterialTable, Settled};
+use crate::pose::{Pose, joint_matrices, pose};
+use crate::textures::TextureTable;
+use crate::write::GENERATOR;
+use crate::{Bounds, Draw, Primitive, Scene, SceneError};
+use crate::{extensions, limits, rig, schema, shape};
+
+/// A scene, and the parts of the file that a pack needs besides.
+#[derive(Debug, Default)]
+pub(crate) struct Imported {
+    pub scene: Scene,
+    /// Pruned, with indices into `textures`; same order as the scene's.
+    pub materials: Vec<schema::Material>,
+    pub roughness: Vec<[f32; 2]>,
+    pub textures: Vec<schema::Texture>,
+    pub samplers: Vec<schema::Sampler>,
+    /// MIME type and bytes.
+    pub pictures: Vec<(&'static str, Vec<u8>)>,
+    /// Same order as the scene's.
+    pub cameras: Vec<schema::Camera>,
+    pub lights: Vec<(schema::Light, Mat4)>,
+    pub warnings: Vec<SceneError>,
+}
+
+pub(crate) type Resolve<'a> = &'a mut dyn FnMut(&str) -> Option<Arc<[u8]>>;
+
+/// Imports a document.
+///
+/// # Errors
+/// All that is wrong at the first stage where something is wrong.
+pub(crate) fn import(
+    file: &str,
+    document: &Document<'_>,
+    resolve: Resolve<'_>,
+) -> Result<Imported, Vec<SceneError>> {
+    let root = &document.root;
+    extensions::check_required(root).map_err(|error| vec![error])?;
+    let buffers = fetch_buffers(file, root, document.bin, resolve)?;
+    let data = Data { root, buffers };
+    let pose = pose(root).map_err(|error| vec![error])?;
+    let textures = TextureTable::new(file, &data, resolve);
+    let importer = Importer {
+        data: &data,
+        pose: &pose,
+        materials: MaterialTable::new(root, textures),
+        scene: Scene::default(),
+        parts: BTreeMap::new(),
+        mirrored: BTreeMap::new(),
+        budget: Budget { steps_left: limits::POSE_STEP_COUNT_MAX },
+        vertex_count: 0,
+        index_count: 0,
+        notes: Notes::default(),
+        cameras: Vec::new(),
+        lights: Vec::new(),
+    };
+    importer.run().map_err(|error| vec![error])
+}
+
+/// Notes in the order they came up, each once.
+#[derive(Debug, Default)]
+struct Notes {
+    list: Vec<String>,
+    seen: BTreeSet<String>,
+}
+
+impl Notes {
+    fn push(&mut self, note: String) {
+        if self.list.len() < limits::NOTE_COUNT_MAX && self.seen.insert(note.clone()) {
+            self.list.push(note);
+        }
+    }
+}
+
+struct Importer<'a, 'b> {
+    data: &'a Data<'b>,
+    pose: &'a Pose,
+    materials: MaterialTable<'a, 'b>,
+    scene: Scene,
+    /// Scene primitive of a file's (mesh, primitive), where it looks the same wherever it stands.
+    parts: BTreeMap<(usize, usize), Option<usize>>,
+    /// Mirror image of a scene primitive.
+    mirrored: BTreeMap<usize, usize>,
+    budget: Budget,
+    vertex_count: usize,
+    index_count: usize,
+    notes: Notes,
+    cameras: Vec<schema::Camera>,
+    lights: Vec<(schema::Light, Mat4)>,
+}
+
+impl Importer<'_, '_> {
+    fn run(mut self) -> Result<Imported, SceneError> {
+        let root = self.data.root;
+        extensions::file_notes(root).into_iter().for_each(|note| self.notes.push(note));
+        self.pose.note.iter().cloned().for_each(|note| self.notes.push(note));
+        for &node in &self.pose.shown {
+            self.add_node(node)?;
+        }
+        if !self.lights.is_empty() {
+            self.notes.push(format!("{} punctual lights are not drawn", self.lights.len()));
+        }
+        order_primitives(&mut self.scene);
+        self.scene.bounds = world_bounds(&self.scene);
+        let Settled { materials, flat, roughness, textures, samplers, pictures, notes, warnings } =
+            self.materials.settle(&mut self.scene);
+        notes.into_iter().for_each(|note| self.notes.push(note));
+        self.scene.materials = flat;
+        // A pack says what its source lacked; places in the pack itself mean nothing to the author.
+        self.scene.notes = remembered_notes(root).unwrap_or(self.notes.list);
+        Ok(Imported {
+            scene: self.scene,
+            materials,
+            roughness,
+            textures,
+            samplers,
+            pictures,
+            cameras: self.cameras,
+            lights: self.lights,
+            warnings,
+        })
+    }
+
+    fn add_node(&mut self, index: usize) -> Result<(), SceneError> {
+        let node = &self.data.root.nodes[index];
+        let world = self.pose.worlds[index];
+        if let Some(camera) = node.camera {
+            let (camera, source) = rig::camera(self.data.root, index, camera, world)?;
+            self.scene.cameras.push(camera);
+            self.cameras.push(source);
+        }
+        if let Some(light) = node.extensions.light {
+            let (light, source) = rig::light(self.data.root, index, light.light, world)?;
+            self.scene.lights.push(light);
+            self.lights.push((source, world.as_mat4()));
+        }
+        let Some(mesh) = node.mesh else { return Ok(()) };
+        let name = node.name.clone().unwrap_or_else(|| format!("node {index}"));
+        match &node.extensions.instancing {
+            None => self.add_mesh(index, mesh, world, &name),
+            Some(instancing) => {
+                for (at, local) in rig::instances(self.data, index, instancing)?.into_iter().enumerate() {
+                    self.add_mesh(index, mesh, world * local, &format!("{name} {at}"))?;
+                }
+                Ok(())
+            }
+        }
+    }
+
+    fn add_mesh(&mut self, node: usize, mesh: usize, world: DMat4, name: &str) -> Result<(), SceneError> {
+        let user = format!("/nodes/{node}/mesh");
+        let count = self.data.root.meshes.len();
+        let source = self.data.root.meshes.get(mesh);
+        let source = source.ok_or_else(|| {
+            SceneError::new(user, format!("mesh {mesh} does not exist, the file has {count}"))
+        })?;
+        if !world.is_finite() {
+            self.notes.push(format!("node `{name}` is not drawn: its place is not finite"));
+            return Ok(());
+        }
+        for at in 0..source.primitives.len() {
+            if self.scene.draws.len() >= limits::DRAW_COUNT_MAX {
+                let limit = limits::DRAW_COUNT_MAX;
+                return Err(SceneError::new(format!("/nodes/{node}"), format!("more than {limit} draws")));
+            }
+            self.add_draw(node, (mesh, at), world, name)?;
+        }
+        Ok(())
+    }
+
+    fn add_draw(
+        &mut self,
+        node: usize,
+        part: (usize, usize),
+        world: DMat4,
+        name: &str,
+    ) -> Result<(), SceneError> {
+        // Decided on what the draw will hold, so that a pack decides alike.
+        let world = world.as_mat4().as_dmat4();
+        let skin = self.data.root.nodes[node].skin;
+        let weights = self.data.root.nodes[node].weights.is_some();
+        let bake = skin.is_none() && is_singular(world);
+        if skin.is_some() || bake {
+            let joints = match skin {
+                Some(skin) => {
+                    joint_matrices(self.data, &self.pose.worlds, skin, &format!("/nodes/{node}/skin"))?
+                }
+                None => vec![world],
+            };
+            let deformation = if skin.is_some() { Placing::Skin(&joints) } else { Placing::Flattened(world) };
+            if let Some(primitive) = self.read_primitive(node, part, deformation)? {
+                self.scene.draws.push(Draw { primitive, world: Mat4::IDENTITY, name: name.to_owned() });
+            }
+            return Ok(());
+        }
+        let shared = if weights { None } else { self.parts.get(&part).copied() };
+        let primitive = match shared {
+            Some(primitive) => primitive,
+            None => self.read_primitive(node, part, Placing::Instance)?,
+        };
+        if !weights {
+            self.parts.insert(part, primitive);
+        }
+        let Some(primitive) = primitive else { return Ok(()) };
+        let (primitive, world) = if world.determinant() < 0.0 {
+            (self.mirrored(primitive)?, world * DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0)))
+        } else {
+            (primitive, world)
+        };
+        self.scene.draws.push(Draw { primitive, world: world.as_mat4(), name: name.to_owned() });
+        Ok(())
+    }
+
+    fn mirrored(&mut self, primitive: usize) -> Result<usize, SceneError> {
+        if let Some(&known) = self.mirrored.get(&primitive) {
+            return Ok(known);
+        }
+        let source = &self.scene.primitives[primitive];
+        let material = source.material;
+        let has_tangents = self.materials.needs(material).tangents.is_some();
+        let (vertices, indices) = shape::mirrored(&source.vertices, &source.indices, has_tangents);
+        let index = self.push_primitive(vertices, indices, material, "")?;
+        self.mirrored.insert(primitive, index);
+        Ok(index)
+    }
+
+    fn read_primitive(
+        &mut self,
+        node: usize,
+        (mesh, at): (usize, usize),
+        placing: Placing<'_>,
+    ) -> Result<Option<usize>, SceneError> {
+        let source = &self.data.root.meshes[mesh];
+        let primitive = &source.primitives[at];
+        let pointer = format!("/meshes/{mesh}/primitives/{at}");
+        let slot = self.materials.slot(primitive.material, &pointer)?;
+        let needs = self.materials.needs(slot);
+        let weights = self.data.root.nodes[node].weights.as_ref().unwrap_or(&source.weights);
+        let deformation = Deformation { weights, placing };
+        match geometry::read(self.data, primitive, &pointer, needs, deformation, &mut self.budget)? {
+            Read::Nothing(why) => {
+                self.notes.push(format!("{pointer} is not drawn: {why}"));
+                Ok(None)
+            }
+            Read::Geometry(geometry) => {
+                self.note_missing_uvs(primitive, needs, &pointer);
+                let (geometry, remarks) = shape::finish(geometry, needs);
+                remarks.into_iter().for_each(|remark| self.notes.push(format!("{pointer}: {remark}")));
+                if geometry.indices.is_empty() {
+                    return Ok(None);
+                }
+                self.push_primitive(geometry.vertices, geometry.indices, slot, &pointer).map(Some)
+            }
+        }
+    }
+
+    fn note_missing_uvs(&mut self, primitive: &schema::Primitive, needs: Needs, pointer: &str) {
+        for set in 0..2 {
+            let name = format!("TEXCOORD_{set}");
+            if needs.uv[set] && !primitive.attributes.contains_key(&name) {
+                self.notes.push(format!("{pointer}: its material's textures want {name}, which it lacks"));
+            }
+        }
+    }
+
+    fn push_primitive(
+        &mut self,
+        vertices: Vec<crate::Vertex>,
+        indices: Vec<u32>,
+        material: usize,
+        pointer: &str,
+    ) -> Result<usize, SceneError> {
+        self.vertex_count += vertices.len();
+        self.index_count += indices.len();
+        for (what, count, limit) in [
+            ("vertices", self.vertex_count, limits::VERTEX_COUNT_MAX),
+            ("indices", self.index_count, limits::INDEX_COUNT_MAX),
+        ] {
+            if count > limit {
+                return Err(SceneError::new(
+                    pointer,
+                    format!("{count} {what} so far exceed the limit of {limit}"),
+                ));
+            }
+        }
+        let bounds = shape::bounds(&vertices);
+        self.scene.primitives.push(Primitive { vertices, indices, material, bounds });
+        Ok(self.scene.primitives.len() - 1)
+    }
+}
+
+/// What a pack of this crate wrote about its source.
+fn remembered_notes(root: &schema::Root) -> Option<Vec<String>> {
+    let extras = root.asset.extras.as_ref().filter(|_| root.asset.generator.as_deref() == Some(GENERATOR))?;
+    let notes = extras.get("notes")?.as_array()?.iter().filter_map(|note| note.as_str());
+    Some(notes.take(limits::NOTE_COUNT_MAX).map(str::to_owned).collect())
+}
+
+/// Flat as far as single precision can say, whatever the scale.
+fn is_singular(world: DMat4) -> bool {
+    let linear = DMat3::from_mat4(world);
+    let lengths = [linear.x_axis, linear.y_axis, linear.z_axis].map(DVec3::length);
+    let (shortest, longest) =
+        (lengths.into_iter().fold(f64::INFINITY, f64::min), lengths.into_iter().fold(0.0, f64::max));
+    let skew = linear.determinant().abs() / lengths.into_iter().product::<f64>();
+    !(shortest > 1e-12 * longest && skew > 1e-6)
+}
+
+/// Keeps the primitives that are drawn, in the order in which they are: one that was only ever mirrored goes.
+fn order_primitives(scene: &mut Scene) {
+    let mut renumbered = BTreeMap::new();
+    for draw in &mut scene.draws {
+        let next = renumbered.len();
+        draw.primitive = *renumbered.entry(draw.primitive).or_insert(next);
+    }
+    let mut kept: Vec<(usize, Primitive)> = std::mem::take(&mut scene.primitives)
+        .into_iter()
+        .enumerate()
+        .filter_map(|(old, primitive)| renumbered.get(&old).map(|&new| (new, primitive)))
+        .collect();
+    kept.sort_by_key(|(new, _)| *new);
+    scene.primitives = kept.into_iter().map(|(_, primitive)| primitive).collect();
+}
+
+fn world_bounds(scene: &Scene) -> Option<Bounds> {
+    let boxes =
+        scene.draws.iter().map(|draw| transformed(scene.primitives[draw.primitive].bounds, draw.world));
+    boxes.reduce(|a, b| Bounds { min: a.min.min(b.min), max: a.max.max(b.max) })
+}
+
+/// Box around a transformed box (J. Arvo, "Transforming Axis-Aligned Bounding Boxes", Graphics Gems, 1990).
+fn transformed(bounds: Bounds, world: Mat4) -> Bounds {
+    let world = world.as_dmat4();
+    let origin = world.w_axis.truncate();
+    let (mut min, mut max) = (origin, origin);
+    for (axis, (low, high)) in [world.x_axis, world.y_axis, world.z_axis]
+        .into_iter()
+        .zip(bounds.min.to_array().into_iter().zip(bounds.max.to_array()))
+    {
+        let (a, b) = (axis.truncate() * f64::from(low), axis.truncate() * f64::from(high));
+        min += a.min(b);
+        max += a.max(b);
+    }
+    Bounds { min: min.as_vec3(), max: max.as_vec3() }
+}

@@ -1,0 +1,18 @@
+//! What a file may ask for before it is refused: a few bytes of JSON can claim terabytes.
+
+/// Most vertices of all distinct primitives together, after strips are split and seams are cut (1.2 GB).
+pub const VERTEX_COUNT_MAX: usize = 1 << 24;
+/// Most indices of all distinct primitives together.
+pub const INDEX_COUNT_MAX: usize = 1 << 26;
+/// Most draws: instances times primitives.
+pub const DRAW_COUNT_MAX: usize = 1 << 16;
+/// Most vertex-times-morph-target and vertex-times-joint steps; bounds the time a file can take.
+pub const POSE_STEP_COUNT_MAX: usize = 1 << 28;
+/// Largest edge of an image in texels; what every wgpu adapter of the default limits takes is half of it.
+pub const IMAGE_EDGE_MAX: u32 = 16_384;
+/// Most texels of all used images together (1 GB decoded).
+pub const TEXEL_COUNT_MAX: usize = 1 << 28;
+/// Most bytes of JSON text.
+pub const JSON_BYTES_MAX: usize = 1 << 28;
+/// Most notes kept; a file with more repeats itself.
+pub const NOTE_COUNT_MAX: usize = 256;

@@ -1,0 +1,152 @@
+//! The crate's two entry points.
+
+use std::sync::Arc;
+
+use kiln_diagnostic::{Diagnostic, Severity};
+use serde::{Deserialize, Serialize};
+
+use crate::import::{Imported, import};
+use crate::{Effect, EffectSet, Scene, SceneError, document, write};
+
+/// What [`pack`] makes of a file.
+#[derive(Clone, Debug)]
+pub struct Packed {
+    /// One normalised GLB without outside references: equal inputs give equal bytes, and packing it again
+    /// gives the same bytes. `None` if the file cannot be drawn.
+    pub glb: Option<Vec<u8>>,
+    /// Materials that some primitive uses, in the order of [`Scene::materials`].
+    pub effects: Vec<MaterialEffects>,
+    /// Counts and extent, for people and planners.
+    pub summary: SceneSummary,
+    /// Errors if there is no GLB; else warnings and notes.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// What one material calls for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MaterialEffects {
+    /// Its name; not unique if the file's names are not.
+    pub material: String,
+    /// Its effects.
+    pub effects: EffectSet,
+    /// Smallest and largest perceptual roughness that occurs on its base layer and clear coat; for an
+    /// unlit material [1, 0], the empty interval, which leaves a union by minimum and maximum as it is.
+    pub roughness: [f32; 2],
+}
+
+/// A scene in numbers.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SceneSummary {
+    /// Distinct geometry.
+    pub primitives: usize,
+    /// Instances of primitives.
+    pub draws: usize,
+    /// Vertices of distinct geometry.
+    pub vertices: usize,
+    /// Triangles as drawn, instances counted.
+    pub triangles: usize,
+    /// Materials in use.
+    pub materials: usize,
+    /// Images in use.
+    pub images: usize,
+    /// Texels of the images in use.
+    pub texels: usize,
+    /// Names of cameras.
+    pub cameras: Vec<String>,
+    /// Punctual lights, which are not drawn.
+    pub lights: usize,
+    /// World bounds, smallest then largest coordinates.
+    pub bounds: Option<[[f32; 3]; 2]>,
+}
+
+impl Packed {
+    /// All effects that any material calls for.
+    pub fn all_effects(&self) -> EffectSet {
+        self.effects.iter().flat_map(|material| material.effects.iter().copied()).collect::<EffectSet>()
+    }
+
+    /// Whether any material calls for `effect`.
+    pub fn calls_for(&self, effect: Effect) -> bool {
+        self.effects.iter().any(|material| material.effects.contains(&effect))
+    }
+}
+
+/// Packs a .gltf or .glb into one normalised GLB and says what it calls for.
+///
+/// `file` is its name relative to the project, for messages and as the base of what it refers to. `resolve`
+/// returns the bytes of a file by its [`crate::Uri::path`]; it is asked for buffers, and for images in use.
+pub fn pack(file: &str, bytes: &[u8], resolve: &mut dyn FnMut(&str) -> Option<Arc<[u8]>>) -> Packed {
+    let text = document::text_of(bytes);
+    let diagnose = |severity, error: SceneError| error.into_diagnostic(severity, file, text);
+    let refuse = |errors: Vec<SceneError>| Packed {
+        glb: None,
+        effects: Vec::new(),
+        summary: SceneSummary::default(),
+        diagnostics: errors.into_iter().map(|error| diagnose(Severity::Error, error)).collect(),
+    };
+    let document = match document::parse(bytes) {
+        Ok(document) => document,
+        Err(error) => return refuse(vec![error]),
+    };
+    let mut imported = match import(file, &document, resolve) {
+        Ok(imported) => imported,
+        Err(errors) => return refuse(errors),
+    };
+    let glb = match write::write(&imported) {
+        Ok(glb) => glb,
+        Err(error) => {
+            return refuse(vec![SceneError::new("", format!("the pack cannot be written: {error}"))]);
+        }
+    };
+    let warnings = std::mem::take(&mut imported.warnings).into_iter();
+    let notes = imported.scene.notes.iter().map(|note| Diagnostic::note(note).in_file(file));
+    Packed {
+        glb: Some(glb),
+        effects: effects(&imported),
+        summary: summary(&imported.scene),
+        diagnostics: warnings.map(|error| diagnose(Severity::Warning, error)).chain(notes).collect(),
+    }
+}
+
+/// Reads a self-contained GLB, above all one that [`pack`] made.
+///
+/// # Errors
+/// The first thing that is wrong. Images that cannot be read are not: the neutral texture stands in.
+pub fn load(glb: &[u8]) -> Result<Scene, SceneError> {
+    let document = document::parse(glb)?;
+    let imported = import("", &document, &mut |_| None);
+    let imported = imported.map_err(|errors| {
+        let first = errors.into_iter().next();
+        first.unwrap_or_else(|| SceneError::new("", "the file cannot be read"))
+    })?;
+    let Imported { mut scene, warnings, .. } = imported;
+    scene.notes.extend(warnings.iter().map(ToString::to_string));
+    Ok(scene)
+}
+
+fn effects(imported: &Imported) -> Vec<MaterialEffects> {
+    let materials = imported.scene.materials.iter().zip(&imported.roughness);
+    materials
+        .map(|(material, &roughness)| MaterialEffects {
+            material: material.name.clone(),
+            effects: material.effects.clone(),
+            roughness,
+        })
+        .collect()
+}
+
+fn summary(scene: &Scene) -> SceneSummary {
+    let triangles = |draw: &crate::Draw| scene.primitives[draw.primitive].indices.len() / 3;
+    SceneSummary {
+        primitives: scene.primitives.len(),
+        draws: scene.draws.len(),
+        vertices: scene.primitives.iter().map(|primitive| primitive.vertices.len()).sum(),
+        triangles: scene.draws.iter().map(triangles).sum(),
+        materials: scene.materials.len(),
+        images: scene.images.len(),
+        texels: scene.images.iter().map(|image| image.rgba.len() / 4).sum(),
+        cameras: scene.cameras.iter().map(|camera| camera.name.clone()).collect(),
+        lights: scene.lights.len(),
+        bounds: scene.bounds.map(|bounds| [bounds.min.to_array(), bounds.max.to_array()]),
+    }
+}

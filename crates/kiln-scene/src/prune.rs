@@ -1,0 +1,275 @@
+//! Which effects a material's values call for; what nothing calls for is taken out of it.
+//!
+//! Names decide nothing: a clear coat of factor 0, a black emissive texture or a flat normal map is no effect.
+
+use crate::images::ChannelRange;
+use crate::materials::parse_alpha_mode;
+use crate::schema::{Clearcoat, Material, NormalTexture, OcclusionTexture, TextureInfo};
+use crate::{AlphaMode, ColorSpace, Effect, EffectSet};
+
+/// Looks up the range of each channel of a texture.
+pub(crate) type Look<'a> = &'a dyn Fn(&TextureInfo) -> ChannelRange;
+
+/// A material without what it does not need, and what it calls for.
+#[derive(Clone, Debug)]
+pub(crate) struct Pruned {
+    pub material: Material,
+    pub effects: EffectSet,
+    /// Perceptual roughness that occurs on base layer and clear coat; [1, 0], the empty interval, if unlit.
+    pub roughness: [f32; 2],
+}
+
+/// Decides all effects but those that depend on vertex colours: see [`settle`].
+pub(crate) fn prune(mut material: Material, look: Look<'_>) -> Pruned {
+    let mut effects = EffectSet::new();
+    if material.extensions.unlit.is_some() {
+        effects.insert(Effect::Unlit);
+        return Pruned { material: unlit(material), effects, roughness: [1.0, 0.0] };
+    }
+    clamp(&mut material);
+    let mut keep = |effect, called_for: bool| {
+        if called_for {
+            effects.insert(effect);
+        }
+        called_for
+    };
+    if !keep(Effect::Emission, emits(&material, look)) {
+        material.emissive_factor = [0.0; 3];
+        material.emissive_texture = None;
+        material.extensions.emissive_strength = None;
+    }
+    if !keep(Effect::NormalMap, material.normal_texture.as_ref().is_some_and(|it| bends(it, look))) {
+        material.normal_texture = None;
+    }
+    if !keep(Effect::Occlusion, material.occlusion_texture.as_ref().is_some_and(|it| occludes(it, look))) {
+        material.occlusion_texture = None;
+    }
+    if !keep(Effect::Clearcoat, prune_clearcoat(&mut material, look)) {
+        material.extensions.clearcoat = None;
+    }
+    if !keep(Effect::Sheen, has_sheen(&material, look)) {
+        material.extensions.sheen = None;
+    }
+    let metal = is_metal(&material, look);
+    let transmits = !metal && transmits(&material, look);
+    if !keep(Effect::Transmission, transmits) {
+        material.extensions.transmission = None;
+    }
+    // A metal reflects its base colour, so the dielectric layer's strength and colour do not show.
+    if !keep(Effect::Specular, !metal && has_specular(&material, look)) {
+        material.extensions.specular = None;
+        material.extensions.ior = None;
+    }
+    let roughness = roughness(&material, look);
+    Pruned { material, effects, roughness }
+}
+
+/// Decides vertex colour and alpha once the geometry is known. `alpha_min` is the smallest vertex alpha.
+pub(crate) fn settle(pruned: &mut Pruned, colored: bool, alpha_min: f32, look: Look<'_>) {
+    if colored {
+        pruned.effects.insert(Effect::VertexColor);
+    }
+    let base = &pruned.material.pbr_metallic_roughness;
+    let texture_min = base.base_color_texture.as_ref().map_or(1.0, |info| unit(look(info).min[3]));
+    let alpha = base.base_color_factor[3] * texture_min * alpha_min;
+    match parse_alpha_mode(&pruned.material) {
+        Some(AlphaMode::Mask { cutoff }) if alpha < cutoff => {
+            pruned.effects.insert(Effect::AlphaMask);
+        }
+        Some(AlphaMode::Blend) if alpha < 1.0 => {
+            pruned.effects.insert(Effect::AlphaBlend);
+        }
+        _ => {
+            pruned.material.alpha_mode = None;
+            pruned.material.alpha_cutoff = None;
+        }
+    }
+}
+
+/// Calls `keep` for every texture of the material and removes those that it refuses.
+pub(crate) fn retain_textures(
+    material: &mut Material,
+    keep: &mut dyn FnMut(&mut TextureInfo, ColorSpace) -> bool,
+) {
+    use ColorSpace::{Linear, Srgb};
+    let base = &mut material.pbr_metallic_roughness;
+    retain(&mut base.base_color_texture, Srgb, keep);
+    retain(&mut base.metallic_roughness_texture, Linear, keep);
+    retain(&mut material.normal_texture, Linear, keep);
+    retain(&mut material.occlusion_texture, Linear, keep);
+    retain(&mut material.emissive_texture, Srgb, keep);
+    if let Some(clearcoat) = &mut material.extensions.clearcoat {
+        retain(&mut clearcoat.clearcoat_texture, Linear, keep);
+        retain(&mut clearcoat.clearcoat_roughness_texture, Linear, keep);
+        retain(&mut clearcoat.clearcoat_normal_texture, Linear, keep);
+    }
+    if let Some(sheen) = &mut material.extensions.sheen {
+        retain(&mut sheen.sheen_color_texture, Srgb, keep);
+        retain(&mut sheen.sheen_roughness_texture, Linear, keep);
+    }
+    if let Some(specular) = &mut material.extensions.specular {
+        retain(&mut specular.specular_texture, Linear, keep);
+        retain(&mut specular.specular_color_texture, Srgb, keep);
+    }
+    if let Some(transmission) = &mut material.extensions.transmission {
+        retain(&mut transmission.transmission_texture, Linear, keep);
+    }
+}
+
+fn retain<T: AsMut<TextureInfo>>(
+    slot: &mut Option<T>,
+    space: ColorSpace,
+    keep: &mut dyn FnMut(&mut TextureInfo, ColorSpace) -> bool,
+) {
+    if slot.as_mut().is_some_and(|texture| !keep(texture.as_mut(), space)) {
+        *slot = None;
+    }
+}
+
+impl AsMut<TextureInfo> for TextureInfo {
+    fn as_mut(&mut self) -> &mut TextureInfo {
+        self
+    }
+}
+
+impl AsMut<TextureInfo> for NormalTexture {
+    fn as_mut(&mut self) -> &mut TextureInfo {
+        &mut self.info
+    }
+}
+
+impl AsMut<TextureInfo> for OcclusionTexture {
+    fn as_mut(&mut self) -> &mut TextureInfo {
+        &mut self.info
+    }
+}
+
+/// Base colour and alpha alone.
+fn unlit(material: Material) -> Material {
+    let base = material.pbr_metallic_roughness;
+    let mut bare = Material {
+        name: material.name,
+        alpha_mode: material.alpha_mode,
+        alpha_cutoff: material.alpha_cutoff,
+        double_sided: material.double_sided,
+        ..Material::default()
+    };
+    bare.pbr_metallic_roughness.base_color_factor = base.base_color_factor;
+    bare.pbr_metallic_roughness.base_color_texture = base.base_color_texture;
+    bare.extensions.unlit = material.extensions.unlit;
+    bare
+}
+
+/// Brings factors into the ranges of the schema; values outside have no physical meaning.
+fn clamp(material: &mut Material) {
+    let unit = |value: &mut f32| *value = value.clamp(0.0, 1.0);
+    let base = &mut material.pbr_metallic_roughness;
+    base.base_color_factor.iter_mut().for_each(unit);
+    unit(&mut base.metallic_factor);
+    unit(&mut base.roughness_factor);
+    material.emissive_factor.iter_mut().for_each(|value| *value = value.max(0.0));
+    if let Some(occlusion) = &mut material.occlusion_texture {
+        unit(&mut occlusion.strength);
+    }
+    if let Some(clearcoat) = &mut material.extensions.clearcoat {
+        unit(&mut clearcoat.clearcoat_factor);
+        unit(&mut clearcoat.clearcoat_roughness_factor);
+    }
+    if let Some(sheen) = &mut material.extensions.sheen {
+        sheen.sheen_color_factor.iter_mut().for_each(unit);
+        unit(&mut sheen.sheen_roughness_factor);
+    }
+    if let Some(specular) = &mut material.extensions.specular {
+        unit(&mut specular.specular_factor);
+        specular.specular_color_factor.iter_mut().for_each(|value| *value = value.max(0.0));
+    }
+    if let Some(transmission) = &mut material.extensions.transmission {
+        unit(&mut transmission.transmission_factor);
+    }
+    if let Some(ior) = &mut material.extensions.ior {
+        // 0 is the extension's own way to say a Fresnel term of 1.
+        ior.ior = if ior.ior == 0.0 { 0.0 } else { ior.ior.max(1.0) };
+    }
+}
+
+fn unit(code: u8) -> f32 {
+    f32::from(code) / 255.0
+}
+
+/// Largest product of factor and texture over the red, green and blue channels.
+fn color_max(factor: [f32; 3], texture: Option<&TextureInfo>, look: Look<'_>) -> f32 {
+    let max = texture.map_or([u8::MAX; 4], |info| look(info).max);
+    (0..3).map(|channel| factor[channel] * unit(max[channel])).fold(0.0, f32::max)
+}
+
+fn channel_max(texture: Option<&TextureInfo>, channel: usize, look: Look<'_>) -> f32 {
+    texture.map_or(1.0, |info| unit(look(info).max[channel]))
+}
+
+fn emits(material: &Material, look: Look<'_>) -> bool {
+    let strength = material.extensions.emissive_strength.as_ref().map_or(1.0, |it| it.emissive_strength);
+    strength > 0.0 && color_max(material.emissive_factor, material.emissive_texture.as_ref(), look) > 0.0
+}
+
+/// 8-bit codes 127 and 128 both stand for 0: neither is exact.
+fn bends(texture: &NormalTexture, look: Look<'_>) -> bool {
+    let ChannelRange { min, max } = look(&texture.info);
+    let flat = min[0] >= 127 && max[0] <= 128 && min[1] >= 127 && max[1] <= 128 && min[2] >= 254;
+    texture.scale != 0.0 && !flat
+}
+
+fn occludes(texture: &OcclusionTexture, look: Look<'_>) -> bool {
+    texture.strength > 0.0 && look(&texture.info).min[0] < u8::MAX
+}
+
+fn prune_clearcoat(material: &mut Material, look: Look<'_>) -> bool {
+    let Some(clearcoat) = &mut material.extensions.clearcoat else { return false };
+    if clearcoat.clearcoat_normal_texture.as_ref().is_some_and(|texture| !bends(texture, look)) {
+        clearcoat.clearcoat_normal_texture = None;
+    }
+    clearcoat.clearcoat_factor * channel_max(clearcoat.clearcoat_texture.as_ref(), 0, look) > 0.0
+}
+
+fn has_sheen(material: &Material, look: Look<'_>) -> bool {
+    let sheen = material.extensions.sheen.as_ref();
+    sheen.is_some_and(|it| color_max(it.sheen_color_factor, it.sheen_color_texture.as_ref(), look) > 0.0)
+}
+
+fn transmits(material: &Material, look: Look<'_>) -> bool {
+    let transmission = material.extensions.transmission.as_ref();
+    transmission.is_some_and(|it| {
+        it.transmission_factor * channel_max(it.transmission_texture.as_ref(), 0, look) > 0.0
+    })
+}
+
+fn is_metal(material: &Material, look: Look<'_>) -> bool {
+    let base = &material.pbr_metallic_roughness;
+    let texture = base.metallic_roughness_texture.as_ref();
+    base.metallic_factor * texture.map_or(1.0, |info| unit(look(info).min[2])) >= 1.0
+}
+
+fn has_specular(material: &Material, look: Look<'_>) -> bool {
+    let ior = material.extensions.ior.as_ref().is_some_and(|it| it.ior != 1.5);
+    let specular = material.extensions.specular.as_ref().is_some_and(|it| {
+        let dimmed = it.specular_texture.as_ref().is_some_and(|info| look(info).min[3] < u8::MAX);
+        let color = it.specular_color_texture.as_ref();
+        let tinted = color.is_some_and(|info| look(info).min[..3] != [u8::MAX; 3]);
+        it.specular_factor != 1.0 || it.specular_color_factor != [1.0; 3] || dimmed || tinted
+    });
+    ior || specular
+}
+
+fn roughness(material: &Material, look: Look<'_>) -> [f32; 2] {
+    let base = &material.pbr_metallic_roughness;
+    let base = interval(base.roughness_factor, base.metallic_roughness_texture.as_ref(), look);
+    let Some(coat) = &material.extensions.clearcoat else { return base };
+    let Clearcoat { clearcoat_roughness_factor: factor, clearcoat_roughness_texture: texture, .. } = coat;
+    let coat = interval(*factor, texture.as_ref(), look);
+    [base[0].min(coat[0]), base[1].max(coat[1])]
+}
+
+/// Roughness is in the green channel of both textures.
+fn interval(factor: f32, texture: Option<&TextureInfo>, look: Look<'_>) -> [f32; 2] {
+    let (low, high) = texture.map_or((1.0, 1.0), |info| (unit(look(info).min[1]), unit(look(info).max[1])));
+    [factor * low, factor * high]
+}

@@ -1,0 +1,276 @@
+//! The render scene: plain data, flattened for drawing.
+
+use std::collections::BTreeSet;
+
+use bytemuck::{Pod, Zeroable};
+use glam::{Mat4, Vec3};
+
+/// Everything a renderer needs to draw one scene.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// Distinct geometry.
+    pub primitives: Vec<Primitive>,
+    /// What to draw: instances of primitives.
+    pub draws: Vec<Draw>,
+    /// Materials; the last one is glTF's default material if anything uses it.
+    pub materials: Vec<Material>,
+    /// An image with the way to sample it.
+    pub textures: Vec<Texture>,
+    /// Decoded 8-bit images.
+    pub images: Vec<Image8>,
+    /// Cameras of the file, with their world transform.
+    pub cameras: Vec<Camera>,
+    /// Punctual lights of the file.
+    pub lights: Vec<Light>,
+    /// World bounds of all draws; `None` for an empty scene.
+    pub bounds: Option<Bounds>,
+    /// What the file asks for and this version draws approximately or not at all, a line each.
+    pub notes: Vec<String>,
+}
+
+/// An axis-aligned box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Smallest coordinates.
+    pub min: Vec3,
+    /// Largest coordinates.
+    pub max: Vec3,
+}
+
+/// One vertex as the vertex buffer holds it; absent attributes have glTF's neutral values.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Vertex {
+    /// Object space.
+    pub position: [f32; 3],
+    /// Object space, unit length.
+    pub normal: [f32; 3],
+    /// Object space, unit length, w = handedness of the bitangent.
+    pub tangent: [f32; 4],
+    /// `TEXCOORD_0`.
+    pub uv0: [f32; 2],
+    /// `TEXCOORD_1`.
+    pub uv1: [f32; 2],
+    /// `COLOR_0`, linear; white where absent.
+    pub color: [f32; 4],
+}
+
+/// A triangle list with one material.
+#[derive(Clone, Debug)]
+pub struct Primitive {
+    /// Vertices.
+    pub vertices: Vec<Vertex>,
+    /// Triangles, three indices each.
+    pub indices: Vec<u32>,
+    /// Index into [`Scene::materials`].
+    pub material: usize,
+    /// Object-space bounds.
+    pub bounds: Bounds,
+}
+
+/// A primitive placed in the world.
+#[derive(Clone, Debug)]
+pub struct Draw {
+    /// Index into [`Scene::primitives`].
+    pub primitive: usize,
+    /// Object to world.
+    pub world: Mat4,
+    /// The node's name, for messages.
+    pub name: String,
+}
+
+/// One shading phenomenon a material calls for. [`Effect::name`] is the feature the shader is compiled with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Effect {
+    /// Alpha below the cutoff is discarded.
+    AlphaMask,
+    /// Blended over what lies behind.
+    AlphaBlend,
+    /// A second specular layer on top.
+    Clearcoat,
+    /// Light of its own.
+    Emission,
+    /// Tangent-space normal texture that is not flat.
+    NormalMap,
+    /// Occlusion texture.
+    Occlusion,
+    /// Cloth-like retroreflection at grazing angles.
+    Sheen,
+    /// `KHR_materials_specular`/`ior` away from their defaults.
+    Specular,
+    /// Light passes through the surface.
+    Transmission,
+    /// Base colour alone, no lighting.
+    Unlit,
+    /// `COLOR_0` multiplies the base colour.
+    VertexColor,
+}
+
+/// Effects of a material, sorted: the shader variant it is drawn with.
+pub type EffectSet = BTreeSet<Effect>;
+
+/// Whether a surface hides what lies behind it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AlphaMode {
+    /// Alpha is ignored.
+    Opaque,
+    /// Fragments with alpha below the cutoff are discarded.
+    Mask {
+        /// The cutoff.
+        cutoff: f32,
+    },
+    /// Blended by alpha.
+    Blend,
+}
+
+/// A glTF material with its extensions' values; absent ones have the specification's defaults.
+#[derive(Clone, Debug, PartialEq)]
+#[expect(missing_docs, reason = "names and meaning are glTF's own")]
+pub struct Material {
+    pub name: String,
+    pub base_color_factor: [f32; 4],
+    pub metallic_factor: f32,
+    pub roughness_factor: f32,
+    /// Includes `KHR_materials_emissive_strength`.
+    pub emissive_factor: [f32; 3],
+    pub normal_scale: f32,
+    pub occlusion_strength: f32,
+    pub ior: f32,
+    pub specular_factor: f32,
+    pub specular_color_factor: [f32; 3],
+    pub clearcoat_factor: f32,
+    pub clearcoat_roughness_factor: f32,
+    pub clearcoat_normal_scale: f32,
+    pub sheen_color_factor: [f32; 3],
+    pub sheen_roughness_factor: f32,
+    pub transmission_factor: f32,
+    pub alpha_mode: AlphaMode,
+    pub double_sided: bool,
+    pub base_color_texture: Option<TextureRef>,
+    pub metallic_roughness_texture: Option<TextureRef>,
+    pub normal_texture: Option<TextureRef>,
+    pub occlusion_texture: Option<TextureRef>,
+    pub emissive_texture: Option<TextureRef>,
+    pub clearcoat_texture: Option<TextureRef>,
+    pub clearcoat_roughness_texture: Option<TextureRef>,
+    pub clearcoat_normal_texture: Option<TextureRef>,
+    pub sheen_color_texture: Option<TextureRef>,
+    pub sheen_roughness_texture: Option<TextureRef>,
+    pub specular_texture: Option<TextureRef>,
+    pub specular_color_texture: Option<TextureRef>,
+    pub transmission_texture: Option<TextureRef>,
+    /// Decided from values, not from names: an extension without effect is not here.
+    pub effects: EffectSet,
+}
+
+/// Where a material reads a texture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TextureRef {
+    /// Index into [`Scene::textures`].
+    pub texture: usize,
+    /// 0 or 1.
+    pub uv_set: u32,
+    /// `KHR_texture_transform` as two rows of an affine map: u' = r0 · (u, v, 1), v' = r1 · (u, v, 1).
+    pub transform: [[f32; 3]; 2],
+}
+
+/// How an image's bytes encode values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ColorSpace {
+    /// Colours: sRGB transfer function on RGB, linear alpha.
+    Srgb,
+    /// Data: normals, roughness, occlusion …
+    Linear,
+}
+
+/// An image with the way to sample it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Texture {
+    /// Index into [`Scene::images`].
+    pub image: usize,
+    /// How the bytes encode values.
+    pub color_space: ColorSpace,
+    /// Wrapping and filtering.
+    pub sampler: Sampler,
+}
+
+/// What happens outside [0, 1].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[expect(missing_docs, reason = "names are glTF's own")]
+pub enum Wrap {
+    Repeat,
+    MirroredRepeat,
+    ClampToEdge,
+}
+
+/// Wrapping and filtering, as the file says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Sampler {
+    /// Along u.
+    pub wrap_u: Wrap,
+    /// Along v.
+    pub wrap_v: Wrap,
+    /// Bilinear when magnified, else nearest.
+    pub mag_linear: bool,
+    /// Bilinear when minified, else nearest.
+    pub min_linear: bool,
+    /// How levels are used: `None` = the base level alone, `Some(true)` = trilinear, `Some(false)` = nearest level.
+    pub mip_linear: Option<bool>,
+}
+
+/// A decoded RGBA image, 8 bits a channel.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Image8 {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `width · height · 4` bytes.
+    pub rgba: Vec<u8>,
+}
+
+/// A perspective or orthographic camera of the file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Camera {
+    /// Its node's or its own name.
+    pub name: String,
+    /// Camera to world; it looks along its −Z.
+    pub world: Mat4,
+    /// Vertical field of view in radians; `None` for orthographic cameras.
+    pub yfov_rad: Option<f32>,
+    /// Near plane.
+    pub znear: f32,
+    /// Far plane; `None` = infinite.
+    pub zfar: Option<f32>,
+}
+
+/// A light of `KHR_lights_punctual`, in world space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Light {
+    /// Colour times intensity, in candela (point, spot) or lux (directional).
+    pub intensity: [f32; 3],
+    /// World position.
+    pub position: Vec3,
+    /// Direction in which it shines, unit length.
+    pub direction: Vec3,
+    /// Which kind.
+    pub kind: LightKind,
+    /// Distance beyond which it has no effect.
+    pub range: Option<f32>,
+}
+
+/// Kinds of punctual lights.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LightKind {
+    /// From infinitely far.
+    Directional,
+    /// In all directions.
+    Point,
+    /// In a cone.
+    Spot {
+        /// Full intensity inside, radians from the axis.
+        inner_cone_rad: f32,
+        /// Nothing outside.
+        outer_cone_rad: f32,
+    },
+}

@@ -1,0 +1,227 @@
+//! Makes geometry fit to draw: finite, with unit normals and tangents, without what nothing refers to.
+//!
+//! Every step leaves a result of its own as it is, bit for bit, so that a pack of a pack is the same pack.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+
+use crate::geometry::Needs;
+use crate::{Bounds, Vertex, tangents};
+
+/// A triangle list.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Geometry {
+    pub vertices: Vec<Vertex>,
+    pub indices: Vec<u32>,
+    pub has_normals: bool,
+    pub has_tangents: bool,
+}
+
+/// How far from 1 the squared length of a unit vector may be; four times what rounding to f32 leaves.
+const UNIT_TOLERANCE: f64 = 1e-6;
+
+/// Repairs `geometry` and adds what is missing; returns sentences about what was wrong.
+pub(crate) fn finish(mut geometry: Geometry, needs: Needs) -> (Geometry, Vec<String>) {
+    let mut remarks = Vec::new();
+    let mut remark = |count: usize, what: &str| {
+        if count > 0 {
+            remarks.push(format!("{count} {what}"));
+        }
+    };
+    remark(drop_non_finite_triangles(&mut geometry), "triangles with non-finite positions were dropped");
+    remark(repair_attributes(&mut geometry), "vertices had non-finite texture coordinates or colours");
+    let had_indices = geometry.vertices.len() < geometry.indices.len();
+    let mut split = false;
+    if needs.normals && !geometry.has_normals {
+        unshare(&mut geometry);
+        flat_normals(&mut geometry);
+        split = true;
+    } else if needs.normals {
+        remark(
+            repair_normals(&mut geometry),
+            "vertices without a usable normal got one from their triangles",
+        );
+    }
+    if let Some(placement) = needs.tangents {
+        if !geometry.has_tangents {
+            unshare(&mut geometry);
+            tangents::generate(&mut geometry, placement);
+            split = true;
+        }
+        remark(repair_tangents(&mut geometry), "vertices without a usable tangent got an arbitrary one");
+    }
+    if split && had_indices {
+        weld(&mut geometry);
+    }
+    compact(&mut geometry);
+    (geometry, remarks)
+}
+
+/// The mirror image about x = 0: `world · diag(−1, 1, 1)` with it shows what `world` with `geometry` does.
+/// The bitangent is a cross product, which mirrors to its opposite: the handedness makes up for it.
+/// Tangents that nothing reads keep their neutral value.
+pub(crate) fn mirrored(vertices: &[Vertex], indices: &[u32], has_tangents: bool) -> (Vec<Vertex>, Vec<u32>) {
+    let mut vertices = vertices.to_vec();
+    for vertex in &mut vertices {
+        vertex.position[0] = -vertex.position[0];
+        vertex.normal[0] = -vertex.normal[0];
+        if has_tangents {
+            vertex.tangent[0] = -vertex.tangent[0];
+            vertex.tangent[3] = -vertex.tangent[3];
+        }
+    }
+    let (triangles, _) = indices.as_chunks::<3>();
+    (vertices, triangles.iter().flat_map(|&[a, b, c]| [a, c, b]).collect())
+}
+
+/// Smallest box around all vertices, of which there is at least one.
+pub(crate) fn bounds(vertices: &[Vertex]) -> Bounds {
+    let first = vertices.first().map_or(glam::Vec3::ZERO, |vertex| vertex.position.into());
+    let mut bounds = Bounds { min: first, max: first };
+    for vertex in vertices {
+        bounds.min = bounds.min.min(vertex.position.into());
+        bounds.max = bounds.max.max(vertex.position.into());
+    }
+    bounds
+}
+
+fn wide(values: [f32; 3]) -> DVec3 {
+    DVec3::from_array(values.map(f64::from))
+}
+
+fn narrow(vector: DVec3) -> [f32; 3] {
+    vector.to_array().map(|value| value as f32)
+}
+
+/// The vector at unit length, untouched where it has it; `None` where it has no direction.
+fn unit(vector: [f32; 3]) -> Option<[f32; 3]> {
+    let length_squared = wide(vector).length_squared();
+    if (length_squared - 1.0).abs() <= UNIT_TOLERANCE {
+        return Some(vector);
+    }
+    (length_squared.is_finite() && length_squared > 1e-24)
+        .then(|| narrow(wide(vector) / length_squared.sqrt()))
+}
+
+fn drop_non_finite_triangles(geometry: &mut Geometry) -> usize {
+    let (triangles, _) = geometry.indices.as_chunks::<3>();
+    let finite =
+        |index: u32| geometry.vertices[index as usize].position.iter().all(|value| value.is_finite());
+    let kept: Vec<u32> =
+        triangles.iter().filter(|t| t.iter().all(|&i| finite(i))).flatten().copied().collect();
+    let dropped = triangles.len() - kept.len() / 3;
+    geometry.indices = kept;
+    dropped
+}
+
+fn repair_attributes(geometry: &mut Geometry) -> usize {
+    let mut repaired = 0;
+    for vertex in &mut geometry.vertices {
+        let uv = vertex.uv0.iter_mut().chain(&mut vertex.uv1).map(|value| (value, 0.0));
+        let values = uv.chain(vertex.color.iter_mut().map(|value| (value, 1.0)));
+        let wrong = values.filter(|(value, _)| !value.is_finite());
+        let count = wrong.map(|(value, neutral)| *value = neutral).count();
+        repaired += usize::from(count > 0);
+        // Colours multiply radiance: a negative one would take light away.
+        vertex.color = vertex.color.map(|value| value.max(0.0));
+    }
+    repaired
+}
+
+/// Gives every corner a vertex of its own.
+fn unshare(geometry: &mut Geometry) {
+    geometry.vertices = geometry.indices.iter().map(|&index| geometry.vertices[index as usize]).collect();
+    geometry.indices = (0..geometry.vertices.len() as u32).collect();
+}
+
+/// Twice the triangle's area along its normal.
+fn area_vector(vertices: &[Vertex], triangle: &[u32; 3]) -> DVec3 {
+    let [a, b, c] = triangle.map(|index| wide(vertices[index as usize].position));
+    (b - a).cross(c - a)
+}
+
+fn flat_normals(geometry: &mut Geometry) {
+    let (triangles, _) = geometry.indices.as_chunks::<3>();
+    for triangle in triangles {
+        let normal = unit_or_up(area_vector(&geometry.vertices, triangle));
+        for &index in triangle {
+            geometry.vertices[index as usize].normal = normal;
+        }
+    }
+}
+
+fn unit_or_up(vector: DVec3) -> [f32; 3] {
+    vector.try_normalize().map_or([0.0, 0.0, 1.0], narrow)
+}
+
+fn repair_normals(geometry: &mut Geometry) -> usize {
+    let units: Vec<_> = geometry.vertices.iter().map(|vertex| unit(vertex.normal)).collect();
+    let used = used_vertices(geometry);
+    let broken = units.iter().zip(&used).filter(|(unit, used)| unit.is_none() && **used).count();
+    let mut sums = vec![DVec3::ZERO; if broken > 0 { units.len() } else { 0 }];
+    if broken > 0 {
+        let (triangles, _) = geometry.indices.as_chunks::<3>();
+        for triangle in triangles {
+            let area = area_vector(&geometry.vertices, triangle);
+            triangle.iter().for_each(|&index| sums[index as usize] += area);
+        }
+    }
+    for (at, (vertex, unit)) in geometry.vertices.iter_mut().zip(units).enumerate() {
+        vertex.normal = unit.unwrap_or_else(|| unit_or_up(sums.get(at).copied().unwrap_or(DVec3::ZERO)));
+    }
+    broken
+}
+
+/// A tangent must be finite, have a direction that is not the normal's, and a handedness of ±1.
+fn repair_tangents(geometry: &mut Geometry) -> usize {
+    let mut repaired = 0;
+    for vertex in &mut geometry.vertices {
+        let [x, y, z, w] = vertex.tangent;
+        let handedness = if w < 0.0 { -1.0 } else { 1.0 };
+        let usable = unit([x, y, z]).filter(|&tangent| wide(tangent).dot(wide(vertex.normal)).abs() < 0.9999);
+        let [x, y, z] = usable.unwrap_or_else(|| {
+            repaired += 1;
+            narrow(wide(vertex.normal).any_orthonormal_vector())
+        });
+        vertex.tangent = [x, y, z, handedness];
+    }
+    repaired
+}
+
+/// Shares vertices that are equal in every bit, in the order of their first use.
+fn weld(geometry: &mut Geometry) {
+    let mut seen: HashMap<[u32; size_of::<Vertex>() / 4], u32> =
+        HashMap::with_capacity(geometry.vertices.len());
+    let mut vertices = Vec::new();
+    for index in &mut geometry.indices {
+        let vertex = geometry.vertices[*index as usize];
+        *index = *seen.entry(bytemuck::cast(vertex)).or_insert_with(|| {
+            vertices.push(vertex);
+            vertices.len() as u32 - 1
+        });
+    }
+    geometry.vertices = vertices;
+}
+
+fn used_vertices(geometry: &Geometry) -> Vec<bool> {
+    let mut used = vec![false; geometry.vertices.len()];
+    geometry.indices.iter().for_each(|&index| used[index as usize] = true);
+    used
+}
+
+/// Removes vertices that no triangle uses and keeps the order of the others.
+fn compact(geometry: &mut Geometry) {
+    let used = used_vertices(geometry);
+    let mut next = 0;
+    let renumbered: Vec<u32> = used
+        .iter()
+        .map(|&used| {
+            next += u32::from(used);
+            next.saturating_sub(1)
+        })
+        .collect();
+    geometry.indices.iter_mut().for_each(|index| *index = renumbered[*index as usize]);
+    let mut flags = used.iter();
+    geometry.vertices.retain(|_| flags.next() == Some(&true));
+}

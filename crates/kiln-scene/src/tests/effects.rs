@@ -1,0 +1,166 @@
+//! Effects come from values, never from the presence of an extension.
+
+use serde_json::{Value, json};
+
+use super::build::File;
+use super::{pack_alone, scene_of};
+use crate::{AlphaMode, Effect, variant_name};
+
+/// Variant of a triangle with this material and textures of these single texels.
+#[track_caller]
+fn variant(material: Value, texels: &[[u8; 4]]) -> String {
+    let file = texels.iter().fold(File::with_material(material), |file, &texel| file.texture(texel));
+    let packed = pack_alone(&file.bytes());
+    let messages: Vec<String> = packed.diagnostics.iter().map(ToString::to_string).collect();
+    assert!(packed.glb.is_some(), "{messages:#?}");
+    variant_name(&packed.effects[0].effects)
+}
+
+fn extension(name: &str, values: Value) -> Value {
+    json!({ "extensions": { name: values } })
+}
+
+#[test]
+fn every_effect_has_one_name() {
+    for effect in Effect::ALL {
+        assert_eq!(Effect::from_name(effect.name()), Some(effect));
+    }
+    assert!(Effect::ALL.is_sorted_by_key(|effect| effect.name()));
+    assert_eq!(Effect::from_name("glow"), None);
+}
+
+#[test]
+fn variant_name_sorts_by_name_and_calls_nothing_base() {
+    assert_eq!(
+        variant_name(&[Effect::Sheen, Effect::AlphaMask, Effect::Clearcoat].into()),
+        "alpha_mask+clearcoat+sheen"
+    );
+    assert_eq!(variant_name(&[].into()), "base");
+}
+
+#[test]
+fn clearcoat_needs_a_factor_and_a_texture_that_is_not_black() {
+    let coat = |factor: f64| extension("KHR_materials_clearcoat", json!({"clearcoatFactor": factor}));
+    assert_eq!(variant(coat(0.0), &[]), "base");
+    assert_eq!(variant(coat(0.5), &[]), "clearcoat");
+    let textured = || {
+        extension(
+            "KHR_materials_clearcoat",
+            json!({"clearcoatFactor": 1.0, "clearcoatTexture": {"index": 0}}),
+        )
+    };
+    assert_eq!(variant(textured(), &[[0, 255, 255, 255]]), "base");
+    assert_eq!(variant(textured(), &[[1, 0, 0, 255]]), "clearcoat");
+}
+
+#[test]
+fn sheen_of_black_is_no_sheen() {
+    let sheen = |color: [f64; 3]| extension("KHR_materials_sheen", json!({"sheenColorFactor": color}));
+    assert_eq!(variant(sheen([0.0; 3]), &[]), "base");
+    assert_eq!(variant(sheen([0.0, 0.1, 0.0]), &[]), "sheen");
+}
+
+#[test]
+fn emission_needs_light_in_factor_texture_and_strength() {
+    let glow = |strength: f64| {
+        json!({"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0},
+            "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}})
+    };
+    assert_eq!(variant(glow(2.0), &[[0, 9, 0, 255]]), "emission");
+    assert_eq!(variant(glow(2.0), &[[0, 0, 0, 255]]), "base");
+    assert_eq!(variant(glow(0.0), &[[9, 9, 9, 255]]), "base");
+}
+
+#[test]
+fn flat_normal_map_and_white_occlusion_are_nothing() {
+    let material = || json!({"normalTexture": {"index": 0}, "occlusionTexture": {"index": 1}});
+    assert_eq!(variant(material(), &[[128, 127, 255, 255], [255; 4]]), "base");
+    assert_eq!(variant(material(), &[[140, 127, 250, 255], [254; 4]]), "normal_map+occlusion");
+}
+
+#[test]
+fn ior_and_specular_count_only_away_from_their_defaults_and_not_on_metal() {
+    let material = |ior: f64, metallic: f64| json!({"pbrMetallicRoughness": {"metallicFactor": metallic}, "extensions": {"KHR_materials_ior": {"ior": ior}}});
+    assert_eq!(variant(material(1.5, 0.0), &[]), "base");
+    assert_eq!(variant(material(1.33, 0.0), &[]), "specular");
+    assert_eq!(variant(material(1.33, 1.0), &[]), "base");
+}
+
+#[test]
+fn transmission_is_an_effect_with_a_note() {
+    let mut material = extension("KHR_materials_transmission", json!({"transmissionFactor": 1.0}));
+    material["pbrMetallicRoughness"] = json!({"metallicFactor": 0.0});
+    let packed = pack_alone(&File::with_material(material).bytes());
+    assert!(packed.calls_for(Effect::Transmission));
+    assert!(packed.diagnostics.iter().any(|it| it.message.contains("transmission is approximated")));
+}
+
+#[test]
+fn unlit_ends_every_other_effect() {
+    let material = json!({"emissiveFactor": [1, 1, 1], "extensions":
+        {"KHR_materials_unlit": {}, "KHR_materials_clearcoat": {"clearcoatFactor": 1.0}}});
+    let packed = pack_alone(&File::with_material(material).bytes());
+    assert_eq!(variant_name(&packed.effects[0].effects), "unlit");
+    assert_eq!(packed.effects[0].roughness, [1.0, 0.0]);
+}
+
+#[test]
+fn alpha_modes_count_only_where_alpha_can_matter() {
+    let material = |mode: &str, alpha: f64| json!({"alphaMode": mode, "pbrMetallicRoughness": {"baseColorFactor": [1.0, 1.0, 1.0, alpha]}});
+    assert_eq!(variant(material("BLEND", 1.0), &[]), "base");
+    assert_eq!(variant(material("BLEND", 0.5), &[]), "alpha_blend");
+    assert_eq!(variant(material("MASK", 0.6), &[]), "base");
+    assert_eq!(variant(material("MASK", 0.4), &[]), "alpha_mask");
+    let scene = scene_of(&File::with_material(material("MASK", 0.6)).bytes());
+    assert_eq!(scene.materials[0].alpha_mode, AlphaMode::Opaque);
+}
+
+#[test]
+fn vertex_colours_of_white_are_no_effect() {
+    let colored = |color: [f32; 4]| {
+        let mut file = File::triangle();
+        let accessor = file.floats(&[[1.0; 4], [1.0; 4], color]);
+        file.primitive()["attributes"]["COLOR_0"] = json!(accessor);
+        variant_name(&pack_alone(&file.bytes()).effects[0].effects)
+    };
+    assert_eq!(colored([1.0; 4]), "base");
+    assert_eq!(colored([1.0, 0.5, 1.0, 1.0]), "vertex_color");
+}
+
+#[test]
+fn roughness_interval_covers_texture_and_coat() {
+    let material = json!({"pbrMetallicRoughness": {"roughnessFactor": 0.5, "metallicRoughnessTexture": {"index": 0}},
+        "extensions": {"KHR_materials_clearcoat": {"clearcoatFactor": 1.0, "clearcoatRoughnessFactor": 0.1}}});
+    let packed = pack_alone(&File::with_material(material).texture([0, 204, 0, 255]).bytes());
+    super::check_within("roughness", &packed.effects[0].roughness, &[0.1, 0.4], 1e-6);
+}
+
+#[test]
+fn materials_that_nothing_uses_are_not_there() {
+    let mut file = File::with_material(json!({"name": "used"}));
+    file.root["materials"].as_array_mut().unwrap().push(extension("KHR_materials_unlit", json!({})));
+    let packed = pack_alone(&file.bytes());
+    assert_eq!(packed.effects.len(), 1);
+    assert_eq!(packed.effects[0].material, "used");
+}
+
+#[test]
+fn specular_glossiness_of_a_pure_metal_and_of_a_dielectric_convert_back() {
+    let convert = |diffuse: [f64; 4], specular: [f64; 3]| {
+        let values = json!({"diffuseFactor": diffuse, "specularFactor": specular, "glossinessFactor": 0.75});
+        let scene =
+            scene_of(&File::with_material(extension("KHR_materials_pbrSpecularGlossiness", values)).bytes());
+        assert!(scene.notes.iter().any(|note| note.contains("converted")));
+        let material = &scene.materials[0];
+        let [r, g, b, _] = material.base_color_factor;
+        [r, g, b, material.metallic_factor, material.roughness_factor]
+    };
+    super::check_within(
+        "metal",
+        &convert([0.0, 0.0, 0.0, 1.0], [1.0, 0.7, 0.3]),
+        &[1.0, 0.7, 0.3, 1.0, 0.25],
+        1e-3,
+    );
+    let dielectric = convert([0.5, 0.25, 0.1, 1.0], [0.04; 3]);
+    super::check_within("dielectric", &dielectric, &[0.5, 0.25, 0.1, 0.0, 0.25], 1e-3);
+}

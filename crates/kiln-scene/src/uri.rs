@@ -1,0 +1,169 @@
+//! Where buffers and images outside the file are, and `data:` URIs.
+
+use kiln_diagnostic::{Diagnostic, Severity};
+
+use crate::{SceneError, document};
+
+/// What a URI is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum UriKind {
+    /// Geometry and other binary data.
+    Buffer,
+    /// A picture.
+    Image,
+}
+
+/// A file that a glTF file refers to.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Uri {
+    /// What it is for.
+    pub kind: UriKind,
+    /// Relative to the project, decoded, with `/`: what [`crate::pack`] asks its resolver for.
+    pub path: String,
+    /// As the file says it, relative to the file's folder, decoded.
+    pub reference: String,
+}
+
+/// Buffers and images outside the file `file` (its name relative to the project), in the file's order,
+/// each once, with a diagnostic for each one that is refused: absolute paths, schemes other than `data:`,
+/// paths that leave the project. A file that cannot be read at all gives its error.
+pub fn external_uris(file: &str, bytes: &[u8]) -> (Vec<Uri>, Vec<Diagnostic>) {
+    let text = document::text_of(bytes);
+    let to_diagnostic = |error: SceneError| error.into_diagnostic(Severity::Error, file, text);
+    let root = match document::parse(bytes) {
+        Ok(document) => document.root,
+        Err(error) => return (Vec::new(), vec![to_diagnostic(error)]),
+    };
+    let buffers = root.buffers.iter().map(|buffer| (UriKind::Buffer, "buffers", buffer.uri.as_deref()));
+    let images = root.images.iter().map(|image| (UriKind::Image, "images", image.uri.as_deref()));
+    let (mut uris, mut diagnostics) = (Vec::new(), Vec::new());
+    for (kind, table, index, uri) in enumerate(buffers).chain(enumerate(images)) {
+        match resolve(file, &format!("/{table}/{index}/uri"), uri) {
+            Ok((path, reference)) => {
+                let uri = Uri { kind, path, reference };
+                if !uris.contains(&uri) {
+                    uris.push(uri);
+                }
+            }
+            Err(error) => diagnostics.push(to_diagnostic(error)),
+        }
+    }
+    (uris, diagnostics)
+}
+
+type Entry<'a> = (UriKind, &'static str, Option<&'a str>);
+
+fn enumerate<'a>(
+    entries: impl Iterator<Item = Entry<'a>>,
+) -> impl Iterator<Item = (UriKind, &'static str, usize, &'a str)> {
+    let outside = |uri: &str| !uri.starts_with("data:");
+    entries.enumerate().filter_map(move |(index, (kind, table, uri))| {
+        uri.filter(|uri| outside(uri)).map(|uri| (kind, table, index, uri))
+    })
+}
+
+/// Project-relative path and decoded reference of a URI in `file`.
+///
+/// # Errors
+/// Absolute paths, schemes, paths out of the project, broken percent-encoding.
+pub(crate) fn resolve(file: &str, pointer: &str, uri: &str) -> Result<(String, String), SceneError> {
+    let refuse = |why: &str| {
+        SceneError::new(pointer, format!("`{}` {why}", shorten(uri)))
+            .with_help("refer to files inside the project, by a path relative to this file")
+    };
+    if has_scheme(uri) {
+        return Err(refuse("has a scheme; only files of the project and `data:` are read"));
+    }
+    let reference = percent_decode(uri).ok_or_else(|| refuse("has a broken percent-encoding"))?;
+    if reference.starts_with(['/', '\\']) || has_scheme(&reference) {
+        return Err(refuse("is an absolute path"));
+    }
+    if reference.contains(['\0', '\\']) {
+        return Err(refuse("contains a character that no path of a project has"));
+    }
+    let folder = file.rsplit_once('/').map_or("", |(folder, _)| folder);
+    let mut parts: Vec<&str> = Vec::new();
+    for part in folder.split('/').chain(reference.split('/')) {
+        match part {
+            "" | "." => {}
+            ".." => {
+                parts.pop().ok_or_else(|| refuse("leaves the project"))?;
+            }
+            part => parts.push(part),
+        }
+    }
+    if reference.is_empty() || parts.is_empty() {
+        return Err(refuse("names no file"));
+    }
+    Ok((parts.join("/"), reference))
+}
+
+/// RFC 3986 scheme, or a drive letter, which looks the same.
+fn has_scheme(uri: &str) -> bool {
+    let Some((scheme, _)) = uri.split_once(':') else { return false };
+    let starts_well = scheme.starts_with(|first: char| first.is_ascii_alphabetic());
+    starts_well && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
+}
+
+fn percent_decode(uri: &str) -> Option<String> {
+    let mut bytes = uri.bytes();
+    let mut decoded = Vec::with_capacity(uri.len());
+    while let Some(byte) = bytes.next() {
+        if byte != b'%' {
+            decoded.push(byte);
+            continue;
+        }
+        let digits = [bytes.next()?, bytes.next()?].map(|digit| char::from(digit).to_digit(16));
+        decoded.push((digits[0]? * 16 + digits[1]?) as u8);
+    }
+    String::from_utf8(decoded).ok()
+}
+
+/// A URI for a message: long ones are cut.
+pub(crate) fn shorten(uri: &str) -> String {
+    let mut short: String = uri.chars().take(80).collect();
+    if short.len() < uri.len() {
+        short.push('…');
+    }
+    short
+}
+
+/// Payload of a `data:` URI (RFC 2397), base64 or percent-encoded; `None` where it is malformed.
+pub(crate) fn data_payload(uri: &str) -> Option<Vec<u8>> {
+    let (head, payload) = uri.strip_prefix("data:")?.split_once(',')?;
+    if head.ends_with(";base64") {
+        base64(payload.as_bytes())
+    } else {
+        percent_decode(payload).map(String::into_bytes)
+    }
+}
+
+/// RFC 4648 with the standard alphabet; padding optional, as exporters forget it.
+fn base64(text: &[u8]) -> Option<Vec<u8>> {
+    let digits = text.strip_suffix(b"==").or_else(|| text.strip_suffix(b"=")).unwrap_or(text);
+    if digits.len() % 4 == 1 {
+        return None;
+    }
+    let mut decoded = Vec::with_capacity(digits.len() * 3 / 4);
+    for group in digits.chunks(4) {
+        let mut bits = 0u32;
+        for &digit in group {
+            bits = bits << 6 | sextet(digit)?;
+        }
+        bits <<= 6 * (4 - group.len());
+        decoded.extend_from_slice(&bits.to_be_bytes()[1..group.len()]);
+    }
+    Some(decoded)
+}
+
+fn sextet(digit: u8) -> Option<u32> {
+    let value = match digit {
+        b'A'..=b'Z' => digit - b'A',
+        b'a'..=b'z' => digit - b'a' + 26,
+        b'0'..=b'9' => digit - b'0' + 52,
+        b'+' | b'-' => 62,
+        b'/' | b'_' => 63,
+        _ => return None,
+    };
+    Some(u32::from(value))
+}

@@ -1,0 +1,223 @@
+//! Writes an imported scene as one normalised GLB.
+//!
+//! One buffer; each primitive a mesh of its own with interleaved floats and only the attributes it needs;
+//! images in buffer views; each draw, camera and light a top node with its world matrix. Matrices may
+//! shear, which a tool that insists on translation, rotation and scale will remark.
+
+use std::collections::BTreeMap;
+
+use glam::Mat4;
+
+use crate::container::join;
+use crate::geometry::NEUTRAL;
+use crate::import::Imported;
+use crate::schema::{
+    Accessor, Asset, Buffer, BufferView, Image, LightIndex, Lights, Mesh, Node, Primitive, Root,
+};
+use crate::{Effect, Material, Vertex, schema};
+
+/// Marks files whose `asset.extras.notes` come from here.
+pub(crate) const GENERATOR: &str = "kiln";
+
+const FLOAT: u32 = 5126;
+const UNSIGNED_SHORT: u32 = 5123;
+const UNSIGNED_INT: u32 = 5125;
+const ARRAY_BUFFER: u32 = 34962;
+const ELEMENT_ARRAY_BUFFER: u32 = 34963;
+
+/// The scene's bytes. Serialising cannot fail: the types hold no maps with keys other than text, and the
+/// import leaves no number that JSON cannot say.
+pub(crate) fn write(imported: &Imported) -> Result<Vec<u8>, serde_json::Error> {
+    let mut writer = Writer { root: Root::default(), bin: Vec::new() };
+    let notes = &imported.scene.notes;
+    writer.root.asset = Asset {
+        version: "2.0".into(),
+        generator: Some(GENERATOR.into()),
+        extras: Some(serde_json::json!({ "notes": notes })),
+    };
+    for primitive in &imported.scene.primitives {
+        writer.mesh(primitive, &imported.scene.materials[primitive.material]);
+    }
+    for (mime_type, bytes) in &imported.pictures {
+        let buffer_view = Some(writer.view(bytes, None, None));
+        writer.root.images.push(Image { mime_type: Some((*mime_type).into()), buffer_view, uri: None });
+    }
+    writer.root.materials.clone_from(&imported.materials);
+    writer.root.textures.clone_from(&imported.textures);
+    writer.root.samplers.clone_from(&imported.samplers);
+    writer.nodes(imported);
+    writer.root.extensions_used = extensions_used(&writer.root);
+    if !writer.bin.is_empty() {
+        writer.root.buffers.push(Buffer { uri: None, byte_length: writer.bin.len() as u64 });
+    }
+    Ok(join(&serde_json::to_vec(&writer.root)?, &writer.bin))
+}
+
+struct Writer {
+    root: Root,
+    bin: Vec<u8>,
+}
+
+impl Writer {
+    fn view(&mut self, bytes: &[u8], byte_stride: Option<u64>, target: Option<u32>) -> usize {
+        self.bin.resize(self.bin.len().next_multiple_of(4), 0);
+        let byte_offset = self.bin.len() as u64;
+        self.bin.extend_from_slice(bytes);
+        let byte_length = bytes.len() as u64;
+        let view = BufferView { byte_offset, byte_length, byte_stride, target, ..BufferView::default() };
+        self.root.buffer_views.push(view);
+        self.root.buffer_views.len() - 1
+    }
+
+    fn accessor(&mut self, accessor: Accessor) -> usize {
+        self.root.accessors.push(accessor);
+        self.root.accessors.len() - 1
+    }
+
+    fn mesh(&mut self, primitive: &crate::Primitive, material: &Material) {
+        let columns = columns(&primitive.vertices, material);
+        let width: usize = columns.iter().map(|column| column.width).sum();
+        let mut bytes = Vec::with_capacity(primitive.vertices.len() * width * 4);
+        for vertex in &primitive.vertices {
+            for column in &columns {
+                bytes.extend_from_slice(bytemuck::cast_slice(&(column.read)(vertex)[..column.width]));
+            }
+        }
+        let view = self.view(&bytes, Some(4 * width as u64), Some(ARRAY_BUFFER));
+        let mut attributes = BTreeMap::new();
+        let mut byte_offset = 0;
+        for column in &columns {
+            let bounds = (column.name == "POSITION").then_some(primitive.bounds);
+            let accessor = Accessor {
+                buffer_view: Some(view),
+                byte_offset,
+                component_type: FLOAT,
+                normalized: false,
+                count: primitive.vertices.len() as u64,
+                kind: format!("VEC{}", column.width),
+                min: bounds.map(|bounds| bounds.min.to_array().to_vec()),
+                max: bounds.map(|bounds| bounds.max.to_array().to_vec()),
+                sparse: None,
+            };
+            byte_offset += 4 * column.width as u64;
+            attributes.insert(column.name.to_owned(), self.accessor(accessor));
+        }
+        let indices = Some(self.indices(&primitive.indices, primitive.vertices.len()));
+        let material = Some(primitive.material);
+        let primitive = Primitive { attributes, indices, material, ..Primitive::default() };
+        self.root.meshes.push(Mesh { primitives: vec![primitive], weights: Vec::new() });
+    }
+
+    fn indices(&mut self, indices: &[u32], vertex_count: usize) -> usize {
+        // 65535 itself is reserved for primitive restart.
+        let narrow = vertex_count <= usize::from(u16::MAX);
+        let bytes: Vec<u8> = if narrow {
+            indices.iter().flat_map(|&index| (index as u16).to_le_bytes()).collect()
+        } else {
+            indices.iter().flat_map(|index| index.to_le_bytes()).collect()
+        };
+        let view = self.view(&bytes, None, Some(ELEMENT_ARRAY_BUFFER));
+        self.accessor(Accessor {
+            buffer_view: Some(view),
+            byte_offset: 0,
+            component_type: if narrow { UNSIGNED_SHORT } else { UNSIGNED_INT },
+            normalized: false,
+            count: indices.len() as u64,
+            kind: "SCALAR".into(),
+            min: None,
+            max: None,
+            sparse: None,
+        })
+    }
+
+    fn nodes(&mut self, imported: &Imported) {
+        for draw in &imported.scene.draws {
+            self.node(Node { mesh: Some(draw.primitive), ..node(Some(draw.name.clone()), draw.world) });
+        }
+        for (at, (camera, source)) in imported.scene.cameras.iter().zip(&imported.cameras).enumerate() {
+            self.root.cameras.push(source.clone());
+            self.node(Node { camera: Some(at), ..node(Some(camera.name.clone()), camera.world) });
+        }
+        let mut lights = Lights::default();
+        for (at, (light, world)) in imported.lights.iter().enumerate() {
+            lights.lights.push(light.clone());
+            let mut node = node(None, *world);
+            node.extensions.light = Some(LightIndex { light: at });
+            self.node(node);
+        }
+        self.root.extensions.lights = (!lights.lights.is_empty()).then_some(lights);
+        let nodes = (0..self.root.nodes.len()).collect();
+        self.root.scenes.push(schema::SceneNodes { nodes });
+        self.root.scene = Some(0);
+    }
+
+    fn node(&mut self, node: Node) {
+        self.root.nodes.push(node);
+    }
+}
+
+fn node(name: Option<String>, world: Mat4) -> Node {
+    let matrix = (world != Mat4::IDENTITY).then(|| world.to_cols_array());
+    Node { name, matrix, ..Node::default() }
+}
+
+struct Column {
+    name: &'static str,
+    width: usize,
+    read: fn(&Vertex) -> [f32; 4],
+}
+
+/// Attributes that the material reads or that differ from the neutral value. Absent normals and tangents
+/// would be made up by whoever reads the pack, so they are written even where they are neutral.
+fn columns(vertices: &[Vertex], material: &Material) -> Vec<Column> {
+    let lit = !material.effects.contains(&Effect::Unlit);
+    let mapped = material.normal_texture.is_some() || material.clearcoat_normal_texture.is_some();
+    let all = [
+        (true, Column { name: "POSITION", width: 3, read: |v| pad(v.position) }),
+        (lit, Column { name: "NORMAL", width: 3, read: |v| pad(v.normal) }),
+        (mapped, Column { name: "TANGENT", width: 4, read: |v| v.tangent }),
+        (false, Column { name: "TEXCOORD_0", width: 2, read: |v| pad(v.uv0) }),
+        (false, Column { name: "TEXCOORD_1", width: 2, read: |v| pad(v.uv1) }),
+        (false, Column { name: "COLOR_0", width: 4, read: |v| v.color }),
+    ];
+    let differs = |column: &Column| {
+        let neutral = (column.read)(&NEUTRAL);
+        vertices.iter().any(|vertex| (column.read)(vertex) != neutral)
+    };
+    all.into_iter().filter(|(needed, column)| *needed || differs(column)).map(|(_, column)| column).collect()
+}
+
+fn pad<const N: usize>(values: [f32; N]) -> [f32; 4] {
+    let mut padded = [0.0; 4];
+    padded[..N].copy_from_slice(&values);
+    padded
+}
+
+/// Sorted names of the extensions that the written tables use.
+fn extensions_used(root: &Root) -> Vec<String> {
+    let mut used: Vec<&str> = Vec::new();
+    let mut add = |is_used: bool, name| {
+        if is_used {
+            used.push(name);
+        }
+    };
+    let any =
+        |test: fn(&schema::MaterialExtensions) -> bool| root.materials.iter().any(|it| test(&it.extensions));
+    add(root.extensions.lights.is_some(), "KHR_lights_punctual");
+    add(any(|it| it.clearcoat.is_some()), "KHR_materials_clearcoat");
+    add(any(|it| it.emissive_strength.is_some()), "KHR_materials_emissive_strength");
+    add(any(|it| it.ior.is_some()), "KHR_materials_ior");
+    add(any(|it| it.sheen.is_some()), "KHR_materials_sheen");
+    add(any(|it| it.specular.is_some()), "KHR_materials_specular");
+    add(any(|it| it.transmission.is_some()), "KHR_materials_transmission");
+    add(any(|it| it.unlit.is_some()), "KHR_materials_unlit");
+    let mut transformed = false;
+    for material in &root.materials {
+        crate::prune::retain_textures(&mut material.clone(), &mut |info, _| {
+            transformed |= info.extensions.transform.is_some();
+            true
+        });
+    }
+    add(transformed, "KHR_texture_transform");
+    used.into_iter().map(str::to_owned).collect()
+}

@@ -1,0 +1,84 @@
+//! Spherical-harmonic coefficients of a three-channel real function.
+
+use std::f64::consts::PI;
+
+/// One coefficient of all channels: re, im of red, green, blue.
+pub(crate) type Coefficient = [f64; 6];
+
+/// Coefficients a_lm = ∫ f(ω) P̄_lm(cos θ) e^{−imλ} dω of a real function per channel, 0 ≤ m ≤ l ≤ band limit.
+///
+/// θ is the angle from +Y, λ = 2πu the panorama's longitude (λ = π looks along −Z), P̄_lm such that
+/// Y_lm = P̄_lm e^{imλ} is orthonormal, without Condon–Shortley sign. The function is real, so
+/// f = Σ_l [a_l0 P̄_l0 + 2 Re Σ_{m>0} a_lm P̄_lm e^{imλ}].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Harmonics {
+    band_limit: usize,
+    /// Order by order: all l of m = 0, then all l ≥ 1 of m = 1 …
+    coefficients: Vec<Coefficient>,
+}
+
+impl Harmonics {
+    /// The zero function.
+    pub fn zero(band_limit: usize) -> Self {
+        Self { band_limit, coefficients: vec![[0.0; 6]; coefficient_count(band_limit)] }
+    }
+
+    /// From the coefficients of order 0, 1 …, each order from l = m up.
+    pub(crate) fn from_orders(band_limit: usize, orders: Vec<Vec<Coefficient>>) -> Self {
+        let coefficients: Vec<_> = orders.into_iter().flatten().collect();
+        assert_eq!(coefficients.len(), coefficient_count(band_limit), "one list per order");
+        Self { band_limit, coefficients }
+    }
+
+    /// From the layout [`Harmonics::coefficients`] returns; `None` if the count does not fit the band limit.
+    pub fn from_coefficients(band_limit: usize, coefficients: Vec<[f64; 6]>) -> Option<Self> {
+        (coefficients.len() == coefficient_count(band_limit)).then_some(Self { band_limit, coefficients })
+    }
+
+    /// Highest degree kept.
+    pub fn band_limit(&self) -> usize {
+        self.band_limit
+    }
+
+    /// All coefficients (re, im of red, green, blue): the degrees 0 … L of m = 0, then 1 … L of m = 1, and so on.
+    pub fn coefficients(&self) -> &[[f64; 6]] {
+        &self.coefficients
+    }
+
+    /// a_lm (re, im of red, green, blue). Panics unless m ≤ l ≤ band limit.
+    pub fn coefficient(&self, l: usize, m: usize) -> [f64; 6] {
+        self.order(m)[l - m]
+    }
+
+    /// The coefficients of order `m`, from l = m to the band limit.
+    pub(crate) fn order(&self, m: usize) -> &[Coefficient] {
+        assert!(m <= self.band_limit, "order {m} over the band limit {}", self.band_limit);
+        let start = m * (2 * self.band_limit + 3 - m) / 2;
+        &self.coefficients[start..start + self.band_limit + 1 - m]
+    }
+
+    /// ‖f_l‖² = Σ_m |a_lm|² (all m from −l to l), summed over the channels, for l = 0 … band limit.
+    ///
+    /// Their sum over l is ∫ |f|² dω of the band-limited function (Parseval).
+    pub fn band_energies(&self) -> Vec<f64> {
+        let mut energies = vec![0.0; self.band_limit + 1];
+        for m in 0..=self.band_limit {
+            let multiplicity = if m == 0 { 1.0 } else { 2.0 };
+            for (energy, a) in energies[m..].iter_mut().zip(self.order(m)) {
+                *energy += multiplicity * a.iter().map(|part| part * part).sum::<f64>();
+            }
+        }
+        energies
+    }
+
+    /// Mean over the sphere, a_00 / √4π, per channel.
+    pub fn mean(&self) -> [f64; 3] {
+        let a = self.coefficients[0];
+        [a[0], a[2], a[4]].map(|part| part / (4.0 * PI).sqrt())
+    }
+}
+
+/// Number of (l, m) with 0 ≤ m ≤ l ≤ `band_limit`.
+pub fn coefficient_count(band_limit: usize) -> usize {
+    (band_limit + 1) * (band_limit + 2) / 2
+}

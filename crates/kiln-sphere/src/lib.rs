@@ -1,0 +1,40 @@
+//! Numbers on the sphere: directions of texels, spherical-harmonic transforms of panoramas, spectra of
+//! the lobes that environments are prefiltered with.
+//!
+//! Start at [`analyse`]: texels in, [`Harmonics`] out. [`synthesise_cube`] multiplies them with a [`Kernel`]'s
+//! spectrum and evaluates the result at the texel centres of a cube map.
+//! [`direction`] holds the layouts (equirectangular panorama, KTX2 cube) that all crates share.
+//!
+//! Conventions: right-handed, +Y up, unit directions; a panorama's centre column looks along −Z, its right
+//! half towards +X, its top is +Y. Angles in radians, `f64` throughout. Harmonics use the polar axis +Y and
+//! the longitude λ = 2πu of the panorama. Equal inputs give equal bits for any number of threads: work is
+//! split over independent outputs only, sums have a fixed order, transcendental functions come from `libm`,
+//! FFTs from rustfft's scalar plan.
+//!
+//! Not here: image files and texel formats (`kiln-image`), reflectance (`kiln-brdf`), which bands and lobes
+//! an artefact needs (`kiln-bake`).
+
+mod analysis;
+pub mod direction;
+mod fft;
+mod harmonics;
+pub mod kernel;
+mod legendre;
+pub mod quadrature;
+mod spread;
+mod synthesis;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
+mod world;
+
+pub use analysis::analyse;
+
+pub use direction::{
+    cube_direction, cube_face_st, cube_texel_solid_angle_sr, panorama_direction, panorama_uv,
+};
+pub use harmonics::{Harmonics, coefficient_count};
+pub use kernel::{Kernel, ggx_kernel_at, kernel_charlie, kernel_ggx, kernel_lambert};
+pub use synthesis::{evaluate, synthesise_cube};
+pub use world::{real_harmonics, world_coefficients};
