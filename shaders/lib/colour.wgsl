@@ -60,3 +60,9 @@ fn tone_map_aces_fitted(linear: vec3f) -> vec3f {
     let fitted = (x * (x + 0.0245786) - 0.000090537) / (x * (0.983729 * x + 0.4329510) + 0.238081);
     return saturate(output * fitted);
 }
+
+// What an f16 target can hold: beyond 65504 it has infinity, and blending makes infinity times 0 of it. A display shows
+// no difference.
+fn within_f16(radiance: vec3f) -> vec3f {
+    return clamp(radiance, vec3f(0.0), vec3f(65504.0));
+}

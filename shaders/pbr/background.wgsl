@@ -1,6 +1,7 @@
 // The environment behind the scene: sharp, or blurred through the specular chain.
 
 import lib::environment::{skybox_radiance, specular_radiance};
+import lib::colour::within_f16;
 import lib::frame::frame;
 import lib::fullscreen::fullscreen_position;
 
@@ -22,7 +23,7 @@ fn vs_main(@builtin(vertex_index) vertex_index: u32) -> Varying {
 @fragment
 fn fs_main(in: Varying) -> @location(0) vec4f {
     if frame.background_blur > 0.0 {
-        return vec4f(specular_radiance(in.direction, min(frame.background_blur, 1.0)), 1.0);
+        return vec4f(within_f16(specular_radiance(in.direction, min(frame.background_blur, 1.0))), 1.0);
     }
-    return vec4f(skybox_radiance(in.direction), 1.0);
+    return vec4f(within_f16(skybox_radiance(in.direction)), 1.0);
 }

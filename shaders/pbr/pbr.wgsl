@@ -4,6 +4,7 @@
 
 @if(!unlit) import lib::brdf::alpha2_filtered;
 @if(specular && !unlit) import lib::brdf::f0_of_ior;
+import lib::colour::within_f16;
 import lib::frame::frame;
 import lib::material::texture_coordinate;
 @if((normal_map || clearcoat) && !unlit) import lib::material::{mapped_normal, TangentFrame};
@@ -263,5 +264,5 @@ fn fs_main(in: Varying, @builtin(front_facing) front_facing: bool) -> @location(
     }
     var alpha = 1.0;
     @if(alpha_blend) alpha = color.a;
-    return vec4f(radiance, alpha);
+    return vec4f(within_f16(radiance), alpha);
 }

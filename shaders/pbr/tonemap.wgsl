@@ -1,6 +1,6 @@
 // Linear radiance to display values: exposure, Khronos PBR Neutral, sRGB.
 
-import lib::colour::{to_srgb, tone_map_pbr_neutral};
+import lib::colour::{to_srgb, within_f16, tone_map_pbr_neutral};
 import lib::frame::{frame, hdr_color};
 import lib::fullscreen::fullscreen_position;
 
@@ -15,7 +15,6 @@ fn vs_main(@builtin(vertex_index) vertex_index: u32) -> @builtin(position) vec4f
 @fragment
 fn fs_main(@builtin(position) position: vec4f) -> @location(0) vec4f {
     let texel = textureLoad(hdr_color, vec2i(position.xy), 0);
-    // A sun overflows an f16 target to infinity, and infinity over infinity is no colour: 65504 is f16's largest.
-    let radiance = clamp(texel.rgb, vec3f(0.0), vec3f(65504.0));
+    let radiance = within_f16(texel.rgb);
     return vec4f(to_srgb(tone_map_pbr_neutral(radiance * WHITE_BALANCE * frame.exposure)), texel.a);
 }

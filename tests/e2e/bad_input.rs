@@ -25,7 +25,8 @@ fn assert_rest_is_built(project: &Project, files: &[&str]) {
 
 #[test]
 fn missing_environment_is_named() {
-    let (project, said) = said_after(|project| std::fs::remove_file(project.path("environments/sky.hdr")).unwrap());
+    let (project, said) =
+        said_after(|project| std::fs::remove_file(project.path("environments/sky.hdr")).unwrap());
     assert_one_error(&said, &["not found", "environments/sky.hdr", "[env.sky]"]);
     assert_rest_is_built(&project, &["env/studio/specular.ktx2", "scene/balls.glb"]);
     assert!(!project.path("baked/env/sky/specular.ktx2").exists());
@@ -51,14 +52,19 @@ fn invalid_gltf_is_placed() {
 
 #[test]
 fn invalid_wgsl_is_placed_in_the_module_that_holds_it() {
-    let (project, said) = said_after(|project| project.edit("shaders/pbr/tonemap.wgsl", "hdr_color,", "hdr_colour,"));
+    let (project, said) =
+        said_after(|project| project.edit("shaders/pbr/tonemap.wgsl", "hdr_color,", "hdr_colour,"));
     assert_one_error(&said, &["shaders/pbr/tonemap.wgsl:", "hdr_colour", "^^^^^^^^^^"]);
-    assert_rest_is_built(&project, &["env/sky/specular.ktx2", "scene/balls.glb", "shader/background/base.wgsl"]);
+    assert_rest_is_built(
+        &project,
+        &["env/sky/specular.ktx2", "scene/balls.glb", "shader/background/base.wgsl"],
+    );
 }
 
 #[test]
 fn unknown_key_gets_a_suggestion() {
-    let (project, said) = said_after(|project| project.edit("kiln.toml", "[env.studio]\nsource", "[env.studio]\nsorce"));
+    let (project, said) =
+        said_after(|project| project.edit("kiln.toml", "[env.studio]\nsource", "[env.studio]\nsorce"));
     assert!(said.contains("unknown key `sorce`") && said.contains("did you mean `source`?"), "{said}");
     assert!(said.contains("kiln.toml:"), "{said}");
     assert_rest_is_built(&project, &["env/sky/specular.ktx2"]);

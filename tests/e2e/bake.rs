@@ -32,7 +32,9 @@ fn first_bake_makes_all_artefacts_and_the_second_runs_nothing() {
 fn baked_textures_are_read_by_another_reader() {
     let project = Project::sample();
     project.bake();
-    for (file, faces, levels) in [("env/sky/specular.ktx2", 6, 7), ("env/sky/skybox.ktx2", 6, 6), ("lut/ggx.ktx2", 1, 1)] {
+    for (file, faces, levels) in
+        [("env/sky/specular.ktx2", 6, 7), ("env/sky/skybox.ktx2", 6, 6), ("lut/ggx.ktx2", 1, 1)]
+    {
         let bytes = std::fs::read(project.path("baked").join(file)).unwrap();
         let reader = ktx2::Reader::new(&bytes[..]).unwrap();
         let header = reader.header();
@@ -59,7 +61,7 @@ fn manifest_holds_no_times_and_no_absolute_paths() {
 fn bake_after_each_kind_of_edit_runs_only_what_it_affects() {
     let project = Project::sample();
     project.bake();
-    let mut ran_after = |file: &str, from: &str, to: &str| {
+    let ran_after = |file: &str, from: &str, to: &str| {
         project.edit(file, from, to);
         let (code, report) = project.bake();
         assert_eq!(code, 0, "{:#}", report["diagnostics"]);
@@ -69,7 +71,11 @@ fn bake_after_each_kind_of_edit_runs_only_what_it_affects() {
     assert_eq!(tonemap, ["compile shader/tonemap/base"]);
     let size = ran_after("kiln.toml", "[env.sky]", "[env.sky]\nirradiance_size = 32");
     assert_eq!(size, ["irradiance env/sky"]);
-    let scene = ran_after("scenes/material_balls.gltf", "\"version\":\"2.0\"", "\"version\":\"2.0\",\"copyright\":\"me\"");
+    let scene = ran_after(
+        "scenes/material_balls.gltf",
+        "\"version\":\"2.0\"",
+        "\"version\":\"2.0\",\"copyright\":\"me\"",
+    );
     assert_eq!(scene, ["pack scene/balls"]);
 }
 

@@ -20,7 +20,9 @@ fn demo_shows_every_edit_from_save_to_frame() {
     if said.contains("no frames, only the artefacts") {
         return skip("demo_shows_every_edit_from_save_to_frame", "there is no graphics device");
     }
-    let frame = |name: &str| std::fs::read(frames.join(name)).unwrap_or_else(|error| panic!("{name}: {error}\n{said}"));
+    let frame = |name: &str| {
+        std::fs::read(frames.join(name)).unwrap_or_else(|error| panic!("{name}: {error}\n{said}"))
+    };
     let first = frame("0-first.png");
     let warm = frame("1-warm.png");
     assert_ne!(first, warm, "the shader edit must be seen");

@@ -30,7 +30,8 @@ fn sample_under_each_environment() {
     watch.published();
     for env in ["sky", "studio", "orientation"] {
         let out = project.beside(env);
-        let mut command = project.command(&["preview", "DIR", "--headless", "--size", "320x180", "--env", env, "--out"]);
+        let mut command =
+            project.command(&["preview", "DIR", "--headless", "--size", "320x180", "--env", env, "--out"]);
         let output = command.arg(&out).output().unwrap();
         let said = text(&output.stderr);
         if said.contains("mesa-vulkan-drivers") {
@@ -84,7 +85,8 @@ fn compare(expected: &RgbImage, actual: &RgbImage, tolerance: Tolerance) -> Resu
 fn show_difference(name: &str, expected: &RgbImage, actual: &RgbImage) -> PathBuf {
     let (width, height) = expected.dimensions();
     let picture = RgbImage::from_fn(width * 3, height, |x, y| {
-        let at = |image: &RgbImage| image.get_pixel_checked(x % width, y).copied().unwrap_or(Rgb([255, 0, 255]));
+        let at =
+            |image: &RgbImage| image.get_pixel_checked(x % width, y).copied().unwrap_or(Rgb([255, 0, 255]));
         match x / width {
             0 => at(expected),
             1 => Rgb([difference(&at(expected), &at(actual)).saturating_mul(16); 3]),

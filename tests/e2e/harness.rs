@@ -102,7 +102,8 @@ pub fn text(bytes: &[u8]) -> String {
 /// Names of the actions with a status in a bake report, sorted.
 pub fn actions_with(report: &Value, status: &str) -> Vec<String> {
     let actions = report["actions"].as_array().unwrap().iter();
-    let named = actions.filter(|action| action["status"] == status).map(|action| action["name"].as_str().unwrap());
+    let named =
+        actions.filter(|action| action["status"] == status).map(|action| action["name"].as_str().unwrap());
     let mut names: Vec<String> = named.map(str::to_owned).collect();
     names.sort();
     names
@@ -192,7 +193,9 @@ impl Viewer {
             let left = deadline.saturating_duration_since(Instant::now());
             match self.0.events().recv_timeout(left).expect("a revision in time") {
                 ClientEvent::Revision(revision) => return revision,
-                ClientEvent::Connected { .. } | ClientEvent::Disconnected { .. } | ClientEvent::Progress { .. } => {}
+                ClientEvent::Connected { .. }
+                | ClientEvent::Disconnected { .. }
+                | ClientEvent::Progress { .. } => {}
             }
         }
     }
@@ -211,7 +214,8 @@ impl Viewer {
 /// Names of the actions that made a published revision, sorted.
 pub fn ran(published: &Value) -> Vec<String> {
     let actions = published["work"]["ran"].as_array().unwrap();
-    let mut names: Vec<String> = actions.iter().map(|action| action["name"].as_str().unwrap().to_owned()).collect();
+    let mut names: Vec<String> =
+        actions.iter().map(|action| action["name"].as_str().unwrap().to_owned()).collect();
     names.sort();
     names
 }

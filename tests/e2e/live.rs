@@ -10,7 +10,10 @@ fn every_kind_of_edit_reaches_two_clients() {
     let project = Project::sample();
     let watch = project.watch();
     let first = watch.published();
-    assert_eq!(first["diagnostics"].as_array().unwrap().iter().filter(|d| d["severity"] == "error").count(), 0);
+    assert_eq!(
+        first["diagnostics"].as_array().unwrap().iter().filter(|d| d["severity"] == "error").count(),
+        0
+    );
     let clients = [watch.client("one"), watch.client("two")];
     let expect_on_both = |number: u64| {
         let revisions = clients.each_ref().map(|client| client.revision());
@@ -33,7 +36,11 @@ fn every_kind_of_edit_reaches_two_clients() {
     let after = expect_on_both(3);
     assert_ne!(before.part("env/sky/specular", "mip3"), after.part("env/sky/specular", "mip3"));
 
-    project.edit("scenes/material_balls.gltf", "\"version\":\"2.0\"", "\"version\":\"2.0\",\"copyright\":\"me\"");
+    project.edit(
+        "scenes/material_balls.gltf",
+        "\"version\":\"2.0\"",
+        "\"version\":\"2.0\",\"copyright\":\"me\"",
+    );
     assert_eq!(ran(&watch.published()), ["pack scene/balls"]);
     expect_on_both(4);
 
@@ -61,7 +68,8 @@ fn atomic_save_by_rename_is_noticed() {
     watch.published();
     let text = project.read("shaders/pbr/tonemap.wgsl").replace("1.0, 1.0, 1.0", "1.0, 0.5, 0.5");
     project.write("shaders/pbr/tonemap.wgsl~", &text);
-    std::fs::rename(project.path("shaders/pbr/tonemap.wgsl~"), project.path("shaders/pbr/tonemap.wgsl")).unwrap();
+    std::fs::rename(project.path("shaders/pbr/tonemap.wgsl~"), project.path("shaders/pbr/tonemap.wgsl"))
+        .unwrap();
     assert_eq!(ran(&watch.published()), ["compile shader/tonemap/base"]);
 }
 

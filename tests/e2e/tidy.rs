@@ -84,12 +84,20 @@ fn core_crates_have_no_io() {
             assert!(io_in(&code).is_empty(), "{} uses {:?}", file.display(), io_in(&code));
         }
     }
-    assert_eq!(io_in("let t = std::time::Instant::now();"), ["std::time", "Instant::now"], "the check itself");
+    assert_eq!(
+        io_in("let t = std::time::Instant::now();"),
+        ["std::time", "Instant::now"],
+        "the check itself"
+    );
 }
 
 fn metadata() -> Value {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    let output = command.args(["metadata", "--format-version", "1", "--offline"]).current_dir(root()).output().unwrap();
+    let output = command
+        .args(["metadata", "--format-version", "1", "--offline"])
+        .current_dir(root())
+        .output()
+        .unwrap();
     serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{error}: {output:?}"))
 }
 
@@ -108,7 +116,8 @@ fn crates_depend_downwards_only() {
             continue;
         }
         let uses = package["dependencies"].as_array().unwrap().iter();
-        let uses = uses.filter(|used| used["kind"].is_null()).map(|used| used["name"].as_str().unwrap().to_owned());
+        let uses =
+            uses.filter(|used| used["kind"].is_null()).map(|used| used["name"].as_str().unwrap().to_owned());
         let uses: BTreeSet<String> = uses.filter(|used| used.starts_with("kiln")).collect();
         assert!(upward_uses(name, &uses).is_empty(), "{name} uses {:?}", upward_uses(name, &uses));
     }

@@ -110,7 +110,10 @@ impl RunReport {
 
     /// Everything that was said, in the graph's order.
     pub fn diagnostics(&self) -> impl Iterator<Item = &Diagnostic> {
-        self.outcomes.iter().filter_map(|outcome| outcome.record.as_ref()).flat_map(|record| &record.diagnostics)
+        self.outcomes
+            .iter()
+            .filter_map(|outcome| outcome.record.as_ref())
+            .flat_map(|record| &record.diagnostics)
     }
 }
 
@@ -168,7 +171,8 @@ impl Engine {
             let outcome = Outcome { status: Status::Reused, record: Some(known) };
             return Ok(Settled { outcome, blobs: Vec::new() });
         }
-        let before = self.last_key(&action.name).and_then(|key| self.store().record_of_past(&key).ok().flatten());
+        let before =
+            self.last_key(&action.name).and_then(|key| self.store().record_of_past(&key).ok().flatten());
         let reason = explain(before.as_ref(), &record);
         (options.progress)(Progress::Started { name: &action.name, reason: &reason });
         let declared = inputs.iter().map(|input| input.source()).collect();
@@ -311,12 +315,11 @@ impl Shared {
         let mut inputs = Vec::new();
         for input in &graph.action(id).inputs {
             let (record, is_source) = match input {
-                Input::Source { path, digest } => {
-                    (InputRecord { name: path.clone(), digest: *digest }, true)
-                }
+                Input::Source { path, digest } => (InputRecord { name: path.clone(), digest: *digest }, true),
                 Input::Output { action, output } => {
                     let name = &graph.action(*action).name;
-                    let made = progress.outcomes[action.0].as_ref().and_then(|outcome| outcome.output(output));
+                    let made =
+                        progress.outcomes[action.0].as_ref().and_then(|outcome| outcome.output(output));
                     let Some(made) = made else { return Declared::Blocked(name.clone()) };
                     (InputRecord { name: format!("{name}/{output}"), digest: Some(made.digest) }, false)
                 }

@@ -157,8 +157,11 @@ fn read_if_present(path: &Path) -> Result<Option<Vec<u8>>, Error> {
 }
 
 pub(crate) fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<(), Error> {
-    let text = serde_json::to_vec(value)
-        .map_err(|error| Error::Io { operation: "encode", path: path.to_owned(), source: error.into() })?;
+    let text = serde_json::to_vec(value).map_err(|error| Error::Io {
+        operation: "encode",
+        path: path.to_owned(),
+        source: error.into(),
+    })?;
     write_atomically(path, &text)
 }
 

@@ -38,7 +38,10 @@ impl Place {
     /// Every blob in the store.
     fn blobs(&self) -> Vec<std::path::PathBuf> {
         let folders = fs::read_dir(self.cache.path().join("v1/cas")).unwrap();
-        folders.flat_map(|folder| fs::read_dir(folder.unwrap().path()).unwrap()).map(|f| f.unwrap().path()).collect()
+        folders
+            .flat_map(|folder| fs::read_dir(folder.unwrap().path()).unwrap())
+            .map(|f| f.unwrap().path())
+            .collect()
     }
 }
 
@@ -69,7 +72,10 @@ fn two_steps(engine: &Engine) -> Graph {
                 let diagnostics = vec![Diagnostic::error("a.txt is missing")];
                 return Ok(ActionOutput { diagnostics, ..ActionOutput::default() });
             };
-            Ok(ActionOutput { outputs: vec![("text".into(), bytes.to_ascii_uppercase())], ..Default::default() })
+            Ok(ActionOutput {
+                outputs: vec![("text".into(), bytes.to_ascii_uppercase())],
+                ..Default::default()
+            })
         }),
     });
     graph.add(Action {
@@ -269,7 +275,8 @@ fn cancelled_run_leaves_the_rest_undone() {
             cancel.store(true, Ordering::Relaxed);
         }
     };
-    let report = engine.run(&graph, &RunOptions { jobs: 1, cancel: &cancel, progress: &stop_after_first }).unwrap();
+    let report =
+        engine.run(&graph, &RunOptions { jobs: 1, cancel: &cancel, progress: &stop_after_first }).unwrap();
     assert!(!report.is_complete());
     assert!(report.outcomes[0].succeeded());
     assert_eq!(report.outcomes[1].status, Status::NotRun);

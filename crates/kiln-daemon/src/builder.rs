@@ -70,7 +70,7 @@ impl BuilderThread {
     fn run(&self, requests: &Receiver<Batch>, built: &impl Fn(BuildResult)) {
         let mut last = self.engine.last_targets();
         while let Ok(batch) = requests.recv() {
-            match self.build(&last) {
+            match Self::guarded(|| self.build(&last)) {
                 Ok(None) => built(BuildResult::Cancelled(batch)),
                 Ok(Some(done)) => {
                     last = done.targets.clone();
@@ -78,7 +78,8 @@ impl BuilderThread {
                     built(BuildResult::Done(Box::new(to_table(done, batch))));
                     // Clients first; the files for engines can follow.
                     if self.options.write_outputs
-                        && let Err(error) = write_outputs(self.engine.store(), &last, &output_dir)
+                        && let Err(error) =
+                            Self::guarded(|| write_outputs(self.engine.store(), &last, &output_dir))
                     {
                         built(BuildResult::OutputsFailed(error));
                     }
@@ -108,6 +109,14 @@ impl BuilderThread {
             result => result,
         }
     }
+
+    /// A panic outside an action ends neither the thread nor the daemon.
+    fn guarded<T>(work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
+        std::panic::catch_unwind(std::panic::AssertUnwindSafe(work)).unwrap_or_else(|_| {
+            let reason = "it panicked; the message stands above".to_owned();
+            Err(Error::Action { action: "build".to_owned(), reason })
+        })
+    }
 }
 
 fn to_table(built: Built, batch: Batch) -> RevisionTable {
@@ -121,8 +130,9 @@ fn to_table(built: Built, batch: Batch) -> RevisionTable {
 pub fn to_work(built: &Built) -> Work {
     let outcomes = &built.report.outcomes;
     let time = |name: &String| {
-        let outcome =
-            outcomes.iter().find(|outcome| outcome.record.as_ref().is_some_and(|record| record.name == *name))?;
+        let outcome = outcomes
+            .iter()
+            .find(|outcome| outcome.record.as_ref().is_some_and(|record| record.name == *name))?;
         let (Some(record), Status::Ran { reason }) = (&outcome.record, &outcome.status) else { return None };
         Some(ActionTime { name: name.clone(), wall_ms: record.wall_ms, reason: reason.clone() })
     };

@@ -114,7 +114,8 @@ impl Daemon {
         let name = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         let blobs = engine.clone();
         let blobs = Box::new(move |digest: &_| blobs.store().get(digest).ok().flatten());
-        let server = Server::bind(&socket, &name, blobs, client_events(sender.clone())).map_err(at(socket.clone()))?;
+        let server =
+            Server::bind(&socket, &name, blobs, client_events(sender.clone())).map_err(at(socket.clone()))?;
         let server = Arc::new(server);
         let mut watch = Watch::start(&folder, send_batches(sender.clone(), Event::Files))?;
         watch.set_relevant(&[kiln_project::PROJECT_FILE.to_owned()]);

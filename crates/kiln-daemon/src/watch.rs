@@ -92,7 +92,7 @@ impl Watch {
 }
 
 /// Removes `.` and `..` without asking the file system, so that missing files have one spelling too.
-fn normalise(path: &Path) -> PathBuf {
+pub(crate) fn normalise(path: &Path) -> PathBuf {
     let mut normal = PathBuf::new();
     for part in path.components() {
         match part {
@@ -106,7 +106,7 @@ fn normalise(path: &Path) -> PathBuf {
 
 /// The sources that an event is about: itself, or those below a folder that appeared, went or moved.
 /// An error (a queue overflow) is about all of them.
-fn name_changes(
+pub(crate) fn name_changes(
     event: &notify::Result<notify::Event>,
     folder: &Path,
     relevant: &Mutex<BTreeMap<PathBuf, String>>,
@@ -132,7 +132,11 @@ fn name_changes(
 }
 
 /// Collects events into batches until the sending side is gone.
-fn settle<E>(events: &Receiver<E>, settled: &impl Fn(Batch), name: impl Fn(&E) -> BTreeSet<String>) {
+pub(crate) fn settle<E>(
+    events: &Receiver<E>,
+    settled: &impl Fn(Batch),
+    name: impl Fn(&E) -> BTreeSet<String>,
+) {
     while let Ok(event) = events.recv() {
         let mut files = name(&event);
         if files.is_empty() {

@@ -76,7 +76,14 @@ pub struct Diagnostic {
 impl Diagnostic {
     /// A diagnostic of the given severity without a place.
     pub fn new(severity: Severity, message: impl Into<String>) -> Self {
-        Diagnostic { severity, message: message.into(), file: None, span: None, notes: Vec::new(), help: None }
+        Diagnostic {
+            severity,
+            message: message.into(),
+            file: None,
+            span: None,
+            notes: Vec::new(),
+            help: None,
+        }
     }
 
     /// An error without a place.

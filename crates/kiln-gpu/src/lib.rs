@@ -80,9 +80,10 @@ impl Gpu {
     /// # Errors
     /// [`GpuError::NoAdapter`], which names the package to install, and [`GpuError::NoDevice`].
     pub fn headless() -> Result<Self, GpuError> {
-        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
-        let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
-        let adapter = choose_adapter(&adapters, None).map_err(|reason| GpuError::NoAdapter { reason })?;
+        // GL is asked last: its libraries look for a display, and complain where there is none.
+        let adapter = adapter_of(wgpu::Backends::PRIMARY)
+            .or_else(|_| adapter_of(wgpu::Backends::SECONDARY))
+            .map_err(|reason| GpuError::NoAdapter { reason })?;
         let opened = pollster::block_on(adapter.request_device(&device_descriptor(&adapter)));
         let (device, queue) = opened.map_err(|error| GpuError::NoDevice {
             adapter: describe_adapter(&adapter.get_info()),
@@ -158,6 +159,13 @@ impl Faults {
 }
 
 /// A panic elsewhere leaves the log readable: it holds plain text.
+fn adapter_of(backends: wgpu::Backends) -> Result<wgpu::Adapter, String> {
+    let descriptor =
+        wgpu::InstanceDescriptor { backends, ..wgpu::InstanceDescriptor::new_without_display_handle() };
+    let adapters = pollster::block_on(wgpu::Instance::new(descriptor).enumerate_adapters(backends));
+    choose_adapter(&adapters, None)
+}
+
 fn lock(faults: &Mutex<Faults>) -> MutexGuard<'_, Faults> {
     faults.lock().unwrap_or_else(PoisonError::into_inner)
 }

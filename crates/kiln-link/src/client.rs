@@ -148,7 +148,9 @@ impl Talk {
     }
 
     fn take_messages(&self, decoder: &mut Decoder, session: &mut ClientSession) -> Result<(), String> {
-        while let Some(message) = decoder.next::<ServerMessage>().map_err(|error| error.to_string())? {
+        while let Some(message) =
+            decoder.next_message::<ServerMessage>().map_err(|error| error.to_string())?
+        {
             let reaction = session.receive(message)?;
             let mut writer = self.writer.lock().unwrap_or_else(PoisonError::into_inner);
             for message in reaction.send {

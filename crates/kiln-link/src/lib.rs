@@ -9,9 +9,9 @@
 //! Not here: what targets mean, when to build (`kiln-daemon`), pixels (`kiln-preview`).
 
 pub use client::{Client, ClientEvent};
+pub use kiln_build::{Digest, Part, Target, TargetState, Targets};
 pub use message::{ClientMessage, FrameReport, PROTOCOL_VERSION, ProgressReport, ServerMessage};
 pub use place::{LockError, ProjectLock, socket_path};
-pub use kiln_build::{Digest, Part, Target, TargetState, Targets};
 pub use revision::{ActionTime, Revision, RevisionTable, Work};
 pub use server::{BlobSource, Server, ServerEvent};
 pub use wire::{Decoder, WireError};

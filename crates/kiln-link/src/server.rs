@@ -15,7 +15,8 @@ use kiln_build::Digest;
 
 use crate::wire::{CHUNK_BYTES, FETCH_DIGESTS_MAX, Message as _};
 use crate::{
-    ClientMessage, Decoder, FrameReport, PROTOCOL_VERSION, ProgressReport, RevisionTable, ServerMessage, transport,
+    ClientMessage, Decoder, FrameReport, PROTOCOL_VERSION, ProgressReport, RevisionTable, ServerMessage,
+    transport,
 };
 
 /// Clients at once.
@@ -198,7 +199,9 @@ fn serve(shared: &Arc<Shared>, client: u64, stream: UnixStream) -> Result<String
             0 => return Ok("it closed the connection".to_owned()),
             count => decoder.push(&buffer[..count]),
         }
-        while let Some(message) = decoder.next::<ClientMessage>().map_err(|error| error.to_string())? {
+        while let Some(message) =
+            decoder.next_message::<ClientMessage>().map_err(|error| error.to_string())?
+        {
             match message {
                 ClientMessage::Hello { protocol, name } => {
                     let Some(stream) = writer.take() else { return Err("it greeted twice".to_owned()) };

@@ -92,7 +92,11 @@ impl ClientSession {
         }
         let content = self.arriving.entry(digest).or_default();
         if content.len() as u64 != offset {
-            return Err(format!("a chunk of {} begins at {offset} instead of {}", digest.short(), content.len()));
+            return Err(format!(
+                "a chunk of {} begins at {offset} instead of {}",
+                digest.short(),
+                content.len()
+            ));
         }
         content.extend_from_slice(bytes);
         if (content.len() as u64) < total {

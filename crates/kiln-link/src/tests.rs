@@ -91,7 +91,9 @@ fn client_reconnects_to_the_next_daemon_on_the_same_socket() {
     loop {
         match client.events().recv_timeout(LIMIT).unwrap() {
             ClientEvent::Revision(revision) => break assert_eq!(revision.table.number, 5),
-            ClientEvent::Connected { .. } | ClientEvent::Disconnected { .. } | ClientEvent::Progress { .. } => {}
+            ClientEvent::Connected { .. }
+            | ClientEvent::Disconnected { .. }
+            | ClientEvent::Progress { .. } => {}
         }
     }
 }
@@ -102,8 +104,7 @@ fn frame_reports_reach_the_daemon() {
     bench.server.publish(Arc::new(table(1, &[])));
     let client = Client::connect(bench.socket.clone(), "viewer");
     next_revision(&client);
-    let report =
-        FrameReport { revision: 1, received_unix_ms: 1.0, ready_unix_ms: 2.0, drawn_unix_ms: 3.5 };
+    let report = FrameReport { revision: 1, received_unix_ms: 1.0, ready_unix_ms: 2.0, drawn_unix_ms: 3.5 };
     client.report_frame(report.clone());
     let connected = bench.events.recv_timeout(LIMIT).unwrap();
     assert_eq!(connected, ServerEvent::Connected { client: 1, name: "viewer".into() });
@@ -137,7 +138,7 @@ fn peer_of_another_version_is_told_so() {
     stream.read_to_end(&mut answer).unwrap();
     let mut decoder = Decoder::default();
     decoder.push(&answer);
-    let message = decoder.next::<ServerMessage>().unwrap().unwrap();
+    let message = decoder.next_message::<ServerMessage>().unwrap().unwrap();
     assert!(ClientSession::default().receive(message).is_ok());
     let gone = bench.events.recv_timeout(LIMIT).unwrap();
     assert!(matches!(&gone, ServerEvent::Gone { reason, .. } if reason.contains("protocol")), "{gone:?}");
@@ -160,7 +161,7 @@ fn messages_survive_being_cut_anywhere() {
         let mut got = Vec::new();
         for piece in bytes.chunks(step) {
             decoder.push(piece);
-            while let Some(message) = decoder.next::<ServerMessage>().unwrap() {
+            while let Some(message) = decoder.next_message::<ServerMessage>().unwrap() {
                 got.push(message);
             }
         }
@@ -171,13 +172,18 @@ fn messages_survive_being_cut_anywhere() {
 #[test]
 fn hostile_frames_are_refused() {
     let too_long = u32::try_from(FRAME_BYTES_MAX + 1).unwrap().to_le_bytes();
-    let cases: [&[u8]; 5] =
-        [&too_long, &[0, 0, 0, 0], &[1, 0, 0, 0, 200], &[3, 0, 0, 0, 67, 1, 2], &[3, 0, 0, 0, 66, b'{', b'}']];
+    let cases: [&[u8]; 5] = [
+        &too_long,
+        &[0, 0, 0, 0],
+        &[1, 0, 0, 0, 200],
+        &[3, 0, 0, 0, 67, 1, 2],
+        &[3, 0, 0, 0, 66, b'{', b'}'],
+    ];
     for case in cases {
         let mut decoder = Decoder::default();
         decoder.push(case);
-        assert!(decoder.next::<ServerMessage>().is_err(), "{case:?}");
-        assert!(decoder.next::<ClientMessage>().is_err(), "{case:?}");
+        assert!(decoder.next_message::<ServerMessage>().is_err(), "{case:?}");
+        assert!(decoder.next_message::<ClientMessage>().is_err(), "{case:?}");
     }
 }
 
@@ -188,7 +194,12 @@ fn greeted() -> ClientSession {
 }
 
 fn chunk(name: &[u8], bytes: &[u8]) -> ServerMessage {
-    ServerMessage::Chunk { digest: Digest::of(name), offset: 0, total: bytes.len() as u64, bytes: bytes.to_vec() }
+    ServerMessage::Chunk {
+        digest: Digest::of(name),
+        offset: 0,
+        total: bytes.len() as u64,
+        bytes: bytes.to_vec(),
+    }
 }
 
 #[test]
@@ -218,7 +229,9 @@ fn daemon_that_lies_about_contents_is_left() {
     session.receive(ServerMessage::Revision(table(1, &[b"a"]))).unwrap();
     assert!(session.receive(chunk(b"a", b"z")).is_err_and(|reason| reason.contains("other bytes")));
     assert!(greeted().receive(chunk(b"a", b"a")).is_err_and(|reason| reason.contains("without being asked")));
-    assert!(ClientSession::default().receive(chunk(b"a", b"a")).is_err_and(|reason| reason.contains("greeting")));
+    assert!(
+        ClientSession::default().receive(chunk(b"a", b"a")).is_err_and(|reason| reason.contains("greeting"))
+    );
 }
 
 #[test]

@@ -79,7 +79,7 @@ impl Decoder {
     }
 
     /// The next whole message, or `None` until more bytes come.
-    pub fn next<M: Message>(&mut self) -> Result<Option<M>, WireError> {
+    pub fn next_message<M: Message>(&mut self) -> Result<Option<M>, WireError> {
         let rest = &self.buffer[self.start..];
         let Some((length, rest)) = rest.split_first_chunk::<4>() else { return Ok(None) };
         let bytes = u32::from_le_bytes(*length) as usize;
@@ -137,7 +137,8 @@ impl Message for ClientMessage {
             CLIENT_FETCH => {
                 let digests: Vec<Digest> = parse(kind, payload)?;
                 if digests.len() > FETCH_DIGESTS_MAX {
-                    let reason = format!("{} digests at once; {FETCH_DIGESTS_MAX} are allowed", digests.len());
+                    let reason =
+                        format!("{} digests at once; {FETCH_DIGESTS_MAX} are allowed", digests.len());
                     return Err(WireError::Payload { kind, reason });
                 }
                 Ok(ClientMessage::Fetch(digests))
@@ -155,10 +156,9 @@ impl Message for ServerMessage {
                 json_frame(SERVER_HELLO, &Hello { protocol: *protocol, name: project.clone() })
             }
             ServerMessage::Revision(table) => json_frame(SERVER_REVISION, table),
-            ServerMessage::Chunk { digest, offset, total, bytes } => frame(
-                SERVER_CHUNK,
-                &[digest.as_bytes(), &offset.to_le_bytes(), &total.to_le_bytes(), bytes],
-            ),
+            ServerMessage::Chunk { digest, offset, total, bytes } => {
+                frame(SERVER_CHUNK, &[digest.as_bytes(), &offset.to_le_bytes(), &total.to_le_bytes(), bytes])
+            }
             ServerMessage::Missing(digest) => json_frame(SERVER_MISSING, digest),
             ServerMessage::Progress(progress) => json_frame(SERVER_PROGRESS, progress),
         }

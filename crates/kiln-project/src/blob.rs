@@ -27,7 +27,8 @@ fn parse(bytes: &[u8]) -> Option<Panorama> {
     let (header, texels) = bytes.split_first_chunk::<HEADER_BYTES>()?;
     let size = |at: usize| header[at..at + 4].try_into().map(u32::from_le_bytes).ok();
     let (width, height) = (size(8)? as usize, size(12)? as usize);
-    let rgb = texels.chunks_exact(4).map(|value| f32::from_le_bytes([value[0], value[1], value[2], value[3]]));
+    let rgb =
+        texels.chunks_exact(4).map(|value| f32::from_le_bytes([value[0], value[1], value[2], value[3]]));
     let image = Image::new(width, height, rgb.collect()).ok()?;
     (header[..8] == *MAGIC).then_some(())?;
     Panorama::new(image).ok()

@@ -158,7 +158,8 @@ fn read_root<'a>(document: &mut Document<'a>, root: &DeTable<'a>, project: &mut 
 
 fn check_version(document: &mut Document, root: &DeTable) {
     let version = root.iter().find(|(key, _)| key.get_ref() == "version").map(|(_, value)| value);
-    let is_known = version.and_then(|value| value.get_ref().as_integer()).is_some_and(|number| number.as_str() == "1");
+    let is_known =
+        version.and_then(|value| value.get_ref().as_integer()).is_some_and(|number| number.as_str() == "1");
     if !is_known {
         let place = version.map_or(0..0, Spanned::span);
         let message = match version {
@@ -234,17 +235,24 @@ fn read_env(section: &mut Section) -> EnvConfig {
         format: section
             .choice("format", &[("rgba16f", TexelFormat::Rgba16Float), ("rgba32f", TexelFormat::Rgba32Float)])
             .unwrap_or(TexelFormat::Rgba16Float),
-        range: section.choice("range", &[("scale", Range::Scale), ("f32", Range::F32)]).unwrap_or(Range::Scale),
+        range: section
+            .choice("range", &[("scale", Range::Scale), ("f32", Range::F32)])
+            .unwrap_or(Range::Scale),
         texels: section
             .choice(
                 "texels",
-                &[("repair", TexelPolicy::Repair), ("error", TexelPolicy::Error), ("keep", TexelPolicy::Keep)],
+                &[
+                    ("repair", TexelPolicy::Repair),
+                    ("error", TexelPolicy::Error),
+                    ("keep", TexelPolicy::Keep),
+                ],
             )
             .unwrap_or(TexelPolicy::Repair),
     };
     if !config.size.is_power_of_two() {
         let message = format!("`size` is {}, which is no power of two", config.size);
-        let help = format!("use {} or {}", config.size.next_power_of_two() / 2, config.size.next_power_of_two());
+        let help =
+            format!("use {} or {}", config.size.next_power_of_two() / 2, config.size.next_power_of_two());
         section.fail(message, section.place("size"), Some(help));
     }
     config

@@ -24,6 +24,10 @@ const SH_CONVENTION: &str = "value(direction) = sum over l, m of c[l(l+1)+m] Y_l
     without Condon-Shortley phase over world axes (+Y up): Y_00 = 0.282095, Y_1-1 = 0.488603 y, Y_10 = 0.488603 z, \
     Y_11 = 0.488603 x; linear Rec. 709; irradiance_over_pi holds E/pi";
 
+/// The environment at the size of the specular chain's first level: an output of the skybox action, which has that
+/// level already unless the chain is larger than the skybox.
+const MIRROR: &str = "mirror";
+
 /// What later steps must know of a decoded panorama without reading it.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Report {
@@ -41,17 +45,18 @@ pub(crate) fn plan_environment(planner: &mut Planner, engine: &Engine, name: &st
     let irradiance = planner.graph.add(steps.irradiance(decode, analyse));
     let sh = planner.graph.add(steps.sh(analyse));
     let target = |map: &str| format!("env/{name}/{map}");
-    planner.target(target("skybox"), "cube", json!({}), vec![PartSpec::AllOf(skybox)]);
+    planner.target(target("skybox"), "cube", json!({}), vec![PartSpec::Levels(skybox)]);
     let meta = json!({"size": env.irradiance_size, "levels": 1});
     planner.target(target("irradiance"), "cube", meta, vec![PartSpec::one(irradiance, "mip0")]);
     planner.target(target("sh"), "sh", json!({"order": SH_ORDER}), vec![PartSpec::one(sh, "json")]);
     let count = specular_level_count(env.size);
     let levels = (0..count).map(|level| {
-        let action = match level {
-            0 => steps.mirror_level(decode),
-            _ => steps.specular_level(decode, analyse, level, count),
-        };
-        PartSpec::one(planner.graph.add(action), &format!("mip{level}"))
+        let part = format!("mip{level}");
+        // Roughness 0 sees the environment itself.
+        if level == 0 {
+            return PartSpec::One { action: skybox, output: MIRROR.to_owned(), part };
+        }
+        PartSpec::one(planner.graph.add(steps.specular_level(decode, analyse, level, count)), &part)
     });
     let levels = levels.collect();
     let meta = json!({"size": env.size, "levels": count, "law": "roughness = mip / (levels - 1)"});
@@ -124,7 +129,9 @@ impl Steps<'_> {
     fn skybox(&self, decode: ActionId) -> Action {
         let env = self.env.clone();
         let inputs = vec![output(decode, "panorama"), output(decode, "report")];
-        self.action("", ("skybox", 1), self.encoding(), inputs, move |inputs| {
+        let mut params = self.encoding();
+        params["mirror_size"] = json!(env.size);
+        self.action("", ("skybox", 1), params, inputs, move |inputs| {
             let panorama = panorama(inputs, 0)?;
             let report = report(inputs, 1)?;
             let face_size = skybox_face_size(report.width);
@@ -136,8 +143,14 @@ impl Steps<'_> {
             shared["levels"] = json!(levels.len());
             let rounding = encoded.iter().map(|level| level.rounding_rms).fold(0.0, f64::max);
             let meta = json!({"shared": shared, "detail": {"rounding_rms": rounding}});
-            let named = encoded.into_iter().enumerate().map(|(index, level)| (format!("mip{index}"), level.bytes));
-            Ok(ActionOutput { outputs: named.collect(), meta, diagnostics: encode.notes() })
+            let mirror = match levels.iter().position(|level| level.face_size == env.size) {
+                Some(level) => encoded[level].bytes.clone(),
+                None => encode.level(&kiln_bake::skybox(&panorama, env.size)[0]).bytes,
+            };
+            let named =
+                encoded.into_iter().enumerate().map(|(index, level)| (format!("mip{index}"), level.bytes));
+            let outputs = named.chain([(MIRROR.to_owned(), mirror)]).collect();
+            Ok(ActionOutput { outputs, meta, diagnostics: encode.notes(&env.source) })
         })
     }
 
@@ -148,7 +161,11 @@ impl Steps<'_> {
         let inputs = vec![output(analyse, "analysis"), output(decode, "report")];
         self.action("", ("irradiance", 1), params, inputs, move |inputs| {
             let map = kiln_bake::irradiance(&analysis(inputs, 0)?, env.irradiance_size);
-            Ok(Encode::new(&env, &report(inputs, 1)?).output("mip0", &map.cube, accuracy_facts(&map.accuracy)))
+            Ok(Encode::new(&env, &report(inputs, 1)?).output(
+                "mip0",
+                &map.cube,
+                accuracy_facts(&map.accuracy),
+            ))
         })
     }
 
@@ -165,19 +182,6 @@ impl Steps<'_> {
             .unwrap_or_default();
             text.push(b'\n');
             Ok(success("json", text, json!({})))
-        })
-    }
-
-    /// Level 0: roughness 0 sees the environment itself.
-    fn mirror_level(&self, decode: ActionId) -> Action {
-        let env = self.env.clone();
-        let mut params = self.encoding();
-        params["size"] = json!(env.size);
-        let inputs = vec![output(decode, "panorama"), output(decode, "report")];
-        self.action("/specular mip 0", ("mirror", 1), params, inputs, move |inputs| {
-            let levels = kiln_bake::skybox(&panorama(inputs, 0)?, env.size);
-            let detail = json!({"roughness": 0.0});
-            Ok(Encode::new(&env, &report(inputs, 1)?).output("mip0", &levels[0], detail))
         })
     }
 
@@ -265,15 +269,19 @@ impl Encode {
     }
 
     /// Said once per environment, with the skybox.
-    fn notes(&self) -> Vec<Diagnostic> {
+    fn notes(&self, source: &str) -> Vec<Diagnostic> {
         if self.scale_log2 == 0 {
             return Vec::new();
         }
         let message = format!(
-            "its peak {:.3e} is above the half float's 65504: texels are stored divided by 2^{}",
+            "the peak {:.3e} is above the half float's 65504: texels are stored divided by 2^{}",
             self.max, self.scale_log2
         );
-        vec![Diagnostic::note(message).with_help("`range = \"f32\"` stores 32-bit floats instead")]
+        vec![
+            Diagnostic::note(message)
+                .in_file(source)
+                .with_help("`range = \"f32\"` stores 32-bit floats instead"),
+        ]
     }
 }
 

@@ -68,7 +68,8 @@ pub fn write_outputs(store: &Store, targets: &Targets, folder: &Path) -> Result<
     let mut written = Written::default();
     for (name, target) in targets {
         let sha256 = target.digest();
-        let known = old.targets.get(name).filter(|known| known.sha256 == sha256 && all_present(folder, known));
+        let known =
+            old.targets.get(name).filter(|known| known.sha256 == sha256 && all_present(folder, known));
         let files = match known {
             Some(known) => {
                 written.kept += known.files.len();
@@ -76,8 +77,13 @@ pub fn write_outputs(store: &Store, targets: &Targets, folder: &Path) -> Result<
             }
             None => write_target(store, name, target, folder, &mut written)?,
         };
-        let entry =
-            ManifestTarget { kind: target.kind.clone(), sha256, state: target.state, files, facts: target.meta.clone() };
+        let entry = ManifestTarget {
+            kind: target.kind.clone(),
+            sha256,
+            state: target.state,
+            files,
+            facts: target.meta.clone(),
+        };
         manifest.targets.insert(name.clone(), entry);
     }
     remove_orphans(folder, &old, &manifest, &mut written);
@@ -132,7 +138,10 @@ fn write_target(
     Ok(files)
 }
 
-fn target_files(store: &Store, name: &str, target: &Target) -> Result<Vec<(String, Arc<[u8]>)>, Error> {
+/// Path and content.
+type OutputFile = (String, Arc<[u8]>);
+
+fn target_files(store: &Store, name: &str, target: &Target) -> Result<Vec<OutputFile>, Error> {
     let mut contents = Vec::with_capacity(target.parts.len());
     for part in &target.parts {
         let bytes = store.get(&part.digest)?.ok_or_else(|| Error::Action {
@@ -167,7 +176,8 @@ fn texture_file(name: &str, target: &Target, contents: &[(&str, Arc<[u8]>)]) -> 
     let mut key_values = vec![("KilnTarget".to_owned(), name.to_owned())];
     for (key, fact) in [("KilnScaleLog2", "scale_log2"), ("KilnLaw", "law")] {
         if let Some(value) = target.meta.get(fact) {
-            key_values.push((key.to_owned(), value.as_str().map_or_else(|| value.to_string(), str::to_owned)));
+            key_values
+                .push((key.to_owned(), value.as_str().map_or_else(|| value.to_string(), str::to_owned)));
         }
     }
     let faces = if target.kind == "cube" { 6 } else { 1 };

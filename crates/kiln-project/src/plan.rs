@@ -1,6 +1,8 @@
 //! From kiln.toml and the sources to a graph of actions and the targets they make.
 
-use kiln_build::{ActionId, ActionRecord, Engine, Error, Graph, RunReport, Target, TargetState, Targets};
+use kiln_build::{
+    ActionId, ActionRecord, Engine, Error, Graph, OutputRecord, Part, RunReport, Target, TargetState, Targets,
+};
 use kiln_diagnostic::{Diagnostic, has_errors};
 use serde_json::{Map, Value, json};
 
@@ -33,21 +35,48 @@ pub struct TargetSpec {
 /// Where a target's contents come from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PartSpec {
-    /// The output of this name, which is the part's name too.
-    One(ActionId, String),
-    /// All outputs of an action.
-    AllOf(ActionId),
+    /// One output of an action.
+    One {
+        /// Which action.
+        action: ActionId,
+        /// Which of its outputs.
+        output: String,
+        /// What it is called in the target.
+        part: String,
+    },
+    /// The outputs `mip0`, `mip1` … of an action, however many there are.
+    Levels(ActionId),
 }
 
 impl PartSpec {
+    /// An output that keeps its name.
     pub(crate) fn one(action: ActionId, output: &str) -> PartSpec {
-        PartSpec::One(action, output.to_owned())
+        PartSpec::One { action, output: output.to_owned(), part: output.to_owned() }
     }
 
     /// The action it comes from.
     pub fn action(&self) -> ActionId {
         match self {
-            PartSpec::One(action, _) | PartSpec::AllOf(action) => *action,
+            PartSpec::One { action, .. } | PartSpec::Levels(action) => *action,
+        }
+    }
+
+    /// The parts, if the action made them.
+    fn resolve(&self, report: &RunReport) -> Option<Vec<Part>> {
+        let outcome = report.outcome(self.action());
+        let named = |name: &str, made: &OutputRecord| Part {
+            name: name.to_owned(),
+            digest: made.digest,
+            bytes: made.bytes,
+        };
+        match self {
+            PartSpec::One { output, part, .. } => Some(vec![named(part, outcome.output(output)?)]),
+            PartSpec::Levels(_) => {
+                let outputs = outcome.record.as_ref()?.outputs.iter();
+                let levels = outputs.filter(|output| output.name.starts_with("mip"));
+                let parts: Vec<Part> = levels.map(|output| named(&output.name, output)).collect();
+                (!parts.is_empty()).then_some(parts)
+            }
         }
     }
 }
@@ -146,30 +175,16 @@ impl Plan {
 }
 
 fn resolve_target(spec: &TargetSpec, report: &RunReport) -> Option<Target> {
-    let mut parts = Vec::new();
-    for part in &spec.parts {
-        let outcome = report.outcome(part.action());
-        let outputs = match part {
-            PartSpec::One(_, name) => vec![outcome.output(name)?.clone()],
-            PartSpec::AllOf(_) => outcome.record.as_ref()?.outputs.clone(),
-        };
-        if outputs.is_empty() {
-            return None;
-        }
-        parts.extend(outputs.into_iter().map(|output| kiln_build::Part {
-            name: output.name,
-            digest: output.digest,
-            bytes: output.bytes,
-        }));
-    }
+    let parts: Vec<Vec<Part>> = spec.parts.iter().map(|part| part.resolve(report)).collect::<Option<_>>()?;
+    let parts = parts.into_iter().flatten().collect();
     let meta = gather_meta(spec, report);
     Some(Target { kind: spec.kind.to_owned(), state: TargetState::Fresh, meta, parts })
 }
 
-/// Facts of the target, then what its actions found out about all of it ("shared") and about each part
-/// ("detail"), and how it was made.
+/// What the target's actions found out about all of it ("shared") and about each part ("detail"), how it was made, and
+/// the facts of the plan, which win: an action may serve two targets.
 fn gather_meta(spec: &TargetSpec, report: &RunReport) -> Value {
-    let mut meta: Map<String, Value> = spec.meta.as_object().cloned().unwrap_or_default();
+    let mut meta = Map::new();
     let mut actions: Vec<ActionId> = spec.parts.iter().map(PartSpec::action).collect();
     actions.dedup();
     let records: Vec<&ActionRecord> =
@@ -194,5 +209,6 @@ fn gather_meta(spec: &TargetSpec, report: &RunReport) -> Value {
     if !recipes.is_empty() {
         meta.insert("made_by".to_owned(), Value::Array(recipes));
     }
+    meta.extend(spec.meta.as_object().cloned().unwrap_or_default());
     Value::Object(meta)
 }

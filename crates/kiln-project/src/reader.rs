@@ -61,7 +61,8 @@ impl<'a, 'd> Section<'a, 'd> {
     }
 
     fn wrong_type(&mut self, key: &str, wanted: &str, value: &Spanned<DeValue>) {
-        let message = format!("`{key}` in [{}] must be {wanted}, not {}", self.name, value.get_ref().type_str());
+        let message =
+            format!("`{key}` in [{}] must be {wanted}, not {}", self.name, value.get_ref().type_str());
         self.fail(message, value.span(), None);
     }
 
@@ -84,17 +85,26 @@ impl<'a, 'd> Section<'a, 'd> {
     }
 
     /// An integer within `range`.
-    pub(crate) fn integer(&mut self, key: &'static str, range: std::ops::RangeInclusive<usize>) -> Option<usize> {
+    pub(crate) fn integer(
+        &mut self,
+        key: &'static str,
+        range: std::ops::RangeInclusive<usize>,
+    ) -> Option<usize> {
         let value = self.find(key)?;
         let Some(integer) = value.get_ref().as_integer() else {
             self.wrong_type(key, "an integer", value);
             return None;
         };
         let digits = integer.as_str().replace('_', "");
-        let number = usize::from_str_radix(&digits, integer.radix()).ok().filter(|number| range.contains(number));
+        let number =
+            usize::from_str_radix(&digits, integer.radix()).ok().filter(|number| range.contains(number));
         if number.is_none() {
-            let message =
-                format!("`{key}` in [{}] must be from {} to {}, not {digits}", self.name, range.start(), range.end());
+            let message = format!(
+                "`{key}` in [{}] must be from {} to {}, not {digits}",
+                self.name,
+                range.start(),
+                range.end()
+            );
             self.fail(message, value.span(), None);
         }
         number
@@ -127,7 +137,8 @@ impl<'a, 'd> Section<'a, 'd> {
         let chosen = choices.iter().find(|(word, _)| *word == text).map(|(_, choice)| *choice);
         if chosen.is_none() {
             let words: Vec<&str> = choices.iter().map(|(word, _)| *word).collect();
-            let message = format!("`{key}` in [{}] is `{text}`, which is none of {}", self.name, words.join(", "));
+            let message =
+                format!("`{key}` in [{}] is `{text}`, which is none of {}", self.name, words.join(", "));
             self.fail(message, place, suggest(&text, words.iter().copied()));
         }
         chosen

@@ -32,12 +32,14 @@ pub(crate) fn plan_scene(
     config: &SceneConfig,
     variants: &mut Variants,
 ) -> Result<(), Error> {
-    let scan = engine.scan("scene", PACK_RECIPE, &config.source, |tracker| scan_scene(&config.source, tracker))?;
+    let scan =
+        engine.scan("scene", PACK_RECIPE, &config.source, |tracker| scan_scene(&config.source, tracker))?;
     let found: SceneScan = serde_json::from_value(scan.found).unwrap_or_default();
     for effects in found.effect_sets {
         variants.ask(&config.shader, effects.into_iter().collect());
     }
-    let inputs = scan.looked_at.iter().map(|(path, digest)| Input::Source { path: path.clone(), digest: *digest });
+    let inputs =
+        scan.looked_at.iter().map(|(path, digest)| Input::Source { path: path.clone(), digest: *digest });
     let (source, paths) = (config.source.clone(), scan.looked_at.clone());
     let pack = planner.graph.add(Action {
         name: format!("pack scene/{name}"),

@@ -117,6 +117,7 @@ pub(crate) fn plan_brdf_table(planner: &mut Planner) {
             Ok(success("texels", bytes, Value::Null))
         }),
     });
-    let meta = json!({"size": BRDF_TABLE_SIZE, "format": "rg32f", "axes": "x = n.v, y = perceptual roughness"});
+    let meta =
+        json!({"size": BRDF_TABLE_SIZE, "format": "rg32f", "axes": "x = n.v, y = perceptual roughness"});
     planner.target("lut/ggx".to_owned(), "lut", meta, vec![PartSpec::one(table, "texels")]);
 }

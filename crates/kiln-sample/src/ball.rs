@@ -15,7 +15,8 @@ const CORE: f64 = 0.86;
 const CENTRE: f64 = 1.15;
 /// Texture repeats per radius at the poles.
 const REPEATS: f64 = 0.5;
-const SEGMENTS: usize = 128;
+/// Around the axis: at 640×360 a facet is a pixel or two, and a software renderer pays for each triangle.
+const SEGMENTS: usize = 64;
 
 /// Shell above the groove, then below it: what the material is shown on.
 pub(crate) fn shells() -> [Surface; 2] {
@@ -23,20 +24,20 @@ pub(crate) fn shells() -> [Surface; 2] {
     let (lip, elevation) = lip();
     let centre = [0.0, CENTRE];
     let upper = Profile::default()
-        .arc(centre, 1.0, radians(90.0), elevation, 40)
-        .arc([lip[0], CENTRE + lip[1]], LIP, elevation, radians(-90.0), 8)
+        .arc(centre, 1.0, radians(90.0), elevation, 20)
+        .arc([lip[0], CENTRE + lip[1]], LIP, elevation, radians(-90.0), 5)
         .line([lip[0], CENTRE + GROOVE], [CORE - 0.02, CENTRE + GROOVE], 1);
     let lower = Profile::default()
         .line([CORE - 0.02, CENTRE - GROOVE], [lip[0], CENTRE - GROOVE], 1)
-        .arc([lip[0], CENTRE - lip[1]], LIP, radians(90.0), -elevation, 8)
-        .arc(centre, 1.0, -elevation, radians(-72.0), 30);
+        .arc([lip[0], CENTRE - lip[1]], LIP, radians(90.0), -elevation, 5)
+        .arc(centre, 1.0, -elevation, radians(-72.0), 15);
     [revolve(&upper, SEGMENTS, mapping(true)), revolve(&lower, SEGMENTS, mapping(false))]
 }
 
 /// The core behind the groove.
 pub(crate) fn core() -> Surface {
     let reach = libm::asin(1.5 * GROOVE / CORE);
-    let profile = Profile::default().arc([0.0, CENTRE], CORE, reach, -reach, 6);
+    let profile = Profile::default().arc([0.0, CENTRE], CORE, reach, -reach, 4);
     revolve(&profile, SEGMENTS, Mapping::Plain)
 }
 
@@ -47,11 +48,11 @@ pub(crate) fn stand(height: f64) -> Surface {
     let profile = Profile::default()
         .arc([0.37, 0.225], 0.03, radians(90.0), 0.0, 5)
         .line([0.40, 0.225], [0.40, 0.19], 1)
-        .arc([0.50, 0.19], -0.10, radians(180.0), radians(270.0), 8)
+        .arc([0.50, 0.19], -0.10, radians(180.0), radians(270.0), 5)
         .line([0.50, top], [foot - rim, top], 1)
-        .arc([foot - rim, top - rim], rim, radians(90.0), 0.0, 8)
+        .arc([foot - rim, top - rim], rim, radians(90.0), 0.0, 5)
         .line([foot, top - rim], [foot, -height], 1);
-    revolve(&profile, 96, Mapping::Plain)
+    revolve(&profile, 48, Mapping::Plain)
 }
 
 /// The ground: a disc with a rounded edge, its top at y = 0.
@@ -62,9 +63,9 @@ pub(crate) fn ground(radius: f64) -> Surface {
         edge,
         radians(90.0),
         radians(-90.0),
-        16,
+        8,
     );
-    revolve(&profile, 256, Mapping::Plain)
+    revolve(&profile, 128, Mapping::Plain)
 }
 
 /// Centre of the upper lip's rounding relative to the ball's, and the elevation where it leaves the sphere:

@@ -11,7 +11,7 @@ use kiln_image::{Panorama, colour};
 use std::f64::consts::PI;
 
 /// Candela per square metre of 1.0.
-pub const UNIT_CD_PER_M2: f64 = 10_000.0;
+pub const UNIT_CD_PER_M2: f64 = 32_000.0;
 
 /// Where the sun stands.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -68,7 +68,7 @@ fn scene_has_the_main_camera_and_all_balls_inside_its_frame() {
 fn each_ball_is_detailed_but_not_heavy() {
     let [upper, lower] = ball::shells();
     let triangles = (upper.indices.len() + lower.indices.len()) / 3;
-    assert!((10_000..=25_000).contains(&triangles), "{triangles}");
+    assert!((3_000..=8_000).contains(&triangles), "{triangles}");
     let index = upper.indices.iter().chain(&lower.indices).max().unwrap();
     assert!((*index as usize) < upper.positions.len().max(lower.positions.len()));
 }

@@ -53,7 +53,7 @@ pub(crate) struct SampleArgs {
     #[arg(long, default_value_t = 38.0, allow_negative_numbers = true)]
     pub(crate) sun_elevation: f64,
     /// Where the generated sun stands, in degrees from straight ahead (-Z) towards the right (+X)
-    #[arg(long, default_value_t = 40.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 150.0, allow_negative_numbers = true)]
     pub(crate) sun_azimuth: f64,
 }
 

@@ -10,7 +10,9 @@ pub(crate) fn cache_folder() -> anyhow::Result<PathBuf> {
     if let Some(cache) = variable("KILN_CACHE") {
         return Ok(cache);
     }
-    let Some(home) = variable("HOME") else { bail!("neither KILN_CACHE nor HOME is set: no place for the cache") };
+    let Some(home) = variable("HOME") else {
+        bail!("neither KILN_CACHE nor HOME is set: no place for the cache")
+    };
     let default = if cfg!(target_os = "macos") { home.join("Library/Caches") } else { home.join(".cache") };
     Ok(variable("XDG_CACHE_HOME").filter(|path| path.is_absolute()).unwrap_or(default).join("kiln"))
 }

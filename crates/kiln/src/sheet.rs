@@ -28,7 +28,10 @@ pub(crate) fn environment_sheet(revision: &Revision, env: &str) -> Option<Vec<u8
                     format!("specular, roughness {roughness:.2}")
                 }
             };
-            tiles.push(Tile { title: format!("{title} ({0}x{0})", cube.face_size), picture: Picture::Cube(cube) });
+            tiles.push(Tile {
+                title: format!("{title} ({0}x{0})", cube.face_size),
+                picture: Picture::Cube(cube),
+            });
             if map == "skybox" {
                 break;
             }
@@ -46,12 +49,16 @@ fn decode_level(target: &Target, level: usize, bytes: &[u8]) -> Option<Cube> {
     let face_size = usize::try_from(fact("size")?).ok()? >> level;
     let scale = 2f32.powi(i32::try_from(fact("scale_log2").unwrap_or(0)).ok()?);
     let values: Vec<f32> = match target.meta.get("format")?.as_str()? {
-        "rgba16f" => bytes.chunks_exact(2).map(|half| f16::from_le_bytes([half[0], half[1]]).to_f32()).collect(),
-        "rgba32f" => {
-            bytes.chunks_exact(4).map(|float| f32::from_le_bytes([float[0], float[1], float[2], float[3]])).collect()
+        "rgba16f" => {
+            bytes.chunks_exact(2).map(|half| f16::from_le_bytes([half[0], half[1]]).to_f32()).collect()
         }
+        "rgba32f" => bytes
+            .chunks_exact(4)
+            .map(|float| f32::from_le_bytes([float[0], float[1], float[2], float[3]]))
+            .collect(),
         _ => return None,
     };
-    let rgb = values.chunks_exact(4).flat_map(|texel| [texel[0], texel[1], texel[2]]).map(|value| value * scale);
+    let rgb =
+        values.chunks_exact(4).flat_map(|texel| [texel[0], texel[1], texel[2]]).map(|value| value * scale);
     Cube::new(face_size, rgb.collect()).ok()
 }

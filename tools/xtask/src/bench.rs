@@ -50,7 +50,9 @@ impl Drop for Running {
 impl Bench {
     fn kiln(&self, cache: &str) -> Command {
         let mut command = Command::new(kiln());
-        command.env("KILN_CACHE", self.folder.join(cache)).env("XDG_RUNTIME_DIR", self.folder.join("runtime"));
+        command
+            .env("KILN_CACHE", self.folder.join(cache))
+            .env("XDG_RUNTIME_DIR", self.folder.join("runtime"));
         command
     }
 
@@ -99,14 +101,21 @@ impl Bench {
         let lines = lines_of(&mut daemon)?;
         let _daemon = Running(daemon);
         let mut preview = self.kiln("cache");
-        let preview = preview.arg("preview").arg(&project).args(["--headless", "--follow", "--size", "640x360", "--out"]);
+        let preview = preview.arg("preview").arg(&project).args([
+            "--headless",
+            "--follow",
+            "--size",
+            "640x360",
+            "--out",
+        ]);
         let preview = preview.arg(self.folder.join("frames")).stdout(Stdio::null()).stderr(Stdio::null());
         let _preview = Running(preview.spawn().map_err(text)?);
         wait_for_frame(&lines)?;
 
         let shader = std::fs::read_to_string(project.join(SHADER)).map_err(text)?;
         let edited = |index: usize| {
-            let constant = format!("const WHITE_BALANCE = vec3f(1.0, 1.0, {:.4});", 0.9 - index as f64 * 1e-3);
+            let constant =
+                format!("const WHITE_BALANCE = vec3f(1.0, 1.0, {:.4});", 0.9 - index as f64 * 1e-3);
             shader.replace(CONSTANT, &constant).into_bytes()
         };
         self.measure("shader save → frame, 640×360", &project.join(SHADER), count, &lines, &edited)?;
@@ -123,7 +132,13 @@ impl Bench {
         // One byte of the header's comment differs each time, so that no result is in the cache.
         let edited = |index: usize| with_comment(&skies[index % 2], index);
         let sky = project.join("environments/sky.hdr");
-        self.measure("HDR save (1024×512, new texels each time) → frame, 640×360", &sky, count, &lines, &edited)
+        self.measure(
+            "HDR save (1024×512, new texels each time) → frame, 640×360",
+            &sky,
+            count,
+            &lines,
+            &edited,
+        )
     }
 
     fn measure(
@@ -178,7 +193,8 @@ fn wait_for_frame(lines: &Receiver<String>) -> Result<f64, String> {
         let left = deadline.saturating_duration_since(Instant::now());
         let line = lines.recv_timeout(left).map_err(|error| format!("no frame: {error}"))?;
         if line.contains("\"event\":\"frame\"") {
-            let number = line.split("\"drawn_unix_ms\":").nth(1).and_then(|rest| rest.split([',', '}']).next());
+            let number =
+                line.split("\"drawn_unix_ms\":").nth(1).and_then(|rest| rest.split([',', '}']).next());
             return number.and_then(|number| number.parse().ok()).ok_or(format!("no time in {line}"));
         }
     }
@@ -198,13 +214,20 @@ pub(crate) fn size() -> Result<(), String> {
         let _ = std::fs::remove_dir_all(&target);
         let start = Instant::now();
         let mut build = cargo(&["build", "--release", "--package", "kiln", "--quiet"]);
-        let status = build.args(arguments).env("CARGO_TARGET_DIR", &target).status().map_err(|error| error.to_string())?;
+        let status = build
+            .args(arguments)
+            .env("CARGO_TARGET_DIR", &target)
+            .status()
+            .map_err(|error| error.to_string())?;
         if !status.success() {
             return Err(format!("the build {name} the preview failed"));
         }
         let seconds = start.elapsed().as_secs_f64();
         let binary = std::fs::metadata(target.join("release/kiln")).map_err(|error| error.to_string())?;
-        println!("{name} the preview: clean build {seconds:.0} s, binary {:.1} MiB", binary.len() as f64 / 1048576.0);
+        println!(
+            "{name} the preview: clean build {seconds:.0} s, binary {:.1} MiB",
+            binary.len() as f64 / 1048576.0
+        );
     }
     Ok(())
 }

@@ -39,12 +39,15 @@ pub(crate) fn run(out: &str) -> Result<(), String> {
     let start = Instant::now();
     step("bake", Command::new(kiln()).arg("bake").arg(&project))?;
     println!("{:.1} s for all panoramas and scenes", start.elapsed().as_secs_f64());
-    let daemon = Command::new(kiln()).arg("watch").arg(&project).arg("--no-output").stdout(Stdio::null()).spawn();
+    let daemon =
+        Command::new(kiln()).arg("watch").arg(&project).arg("--no-output").stdout(Stdio::null()).spawn();
     let _daemon = Daemon(daemon.map_err(|error| format!("cannot start the daemon: {error}"))?);
     for scene in SCENES {
         let name = name_of(scene);
         let mut render = Command::new(kiln());
-        render.args(["preview", "--headless", "--size", "960x540", "--scene", &name, "--out"]).arg(out.join(&name));
+        render
+            .args(["preview", "--headless", "--size", "960x540", "--scene", &name, "--out"])
+            .arg(out.join(&name));
         println!("{}", output_of(render.arg(&project))?.trim());
     }
     Ok(())
@@ -69,8 +72,9 @@ fn write_project(corpus: &Path, project: &Path) -> Result<(), String> {
     let mut toml = "version = 1\n[project]\nname = \"corpus\"\n".to_owned();
     for folder in PANORAMAS {
         let entries = corpus.join(folder).read_dir().map_err(|error| format!("{folder}: {error}"))?;
-        let mut files: Vec<String> =
-            entries.filter_map(|entry| Some(entry.ok()?.file_name().to_string_lossy().into_owned())).collect();
+        let mut files: Vec<String> = entries
+            .filter_map(|entry| Some(entry.ok()?.file_name().to_string_lossy().into_owned()))
+            .collect();
         files.sort();
         for file in files.iter().filter(|file| file.ends_with(".hdr") || file.ends_with(".exr")) {
             let kind = if file.ends_with(".exr") { "exr-" } else { "" };

@@ -10,7 +10,8 @@ const NEEDED: [(&str, fn() -> bool); 2] = [("mesa-vulkan-drivers", has_vulkan_dr
 
 fn has_vulkan_driver() -> bool {
     let folders = ["/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d", "/usr/local/share/vulkan/icd.d"];
-    let has_entry = |folder: &&str| Path::new(folder).read_dir().is_ok_and(|mut entries| entries.next().is_some());
+    let has_entry =
+        |folder: &&str| Path::new(folder).read_dir().is_ok_and(|mut entries| entries.next().is_some());
     folders.iter().any(|folder| has_entry(&folder))
 }
 

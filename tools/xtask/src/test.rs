@@ -25,17 +25,23 @@ pub(crate) fn run(may_install: bool) -> Result<(), String> {
         tests.env("KILN_REQUIRE_GPU", "1");
     }
     step("tests", &mut tests)?;
-    step("clippy", &mut cargo(&["clippy", "--release", "--workspace", "--all-targets", "--", "-D", "warnings"]))?;
-    step("clippy without the preview", &mut cargo(&[
+    step(
         "clippy",
-        "--release",
-        "--package",
-        "kiln",
-        "--no-default-features",
-        "--",
-        "-D",
-        "warnings",
-    ]))?;
+        &mut cargo(&["clippy", "--release", "--workspace", "--all-targets", "--", "-D", "warnings"]),
+    )?;
+    step(
+        "clippy without the preview",
+        &mut cargo(&[
+            "clippy",
+            "--release",
+            "--package",
+            "kiln",
+            "--no-default-features",
+            "--",
+            "-D",
+            "warnings",
+        ]),
+    )?;
     let mut docs = cargo(&["doc", "--release", "--workspace", "--no-deps", "--document-private-items"]);
     step("docs", docs.env("RUSTDOCFLAGS", "-D warnings"))
 }

@@ -63,7 +63,8 @@ fn print_report(args: &BakeArgs, built: &Built, written: &Written) {
     };
     lines.iter().for_each(|line| println!("{line}"));
     report::print_diagnostics(&built.diagnostics, !work.ran.is_empty());
-    let blocked = built.report.outcomes.iter().filter(|outcome| matches!(outcome.status, Status::Blocked { .. }));
+    let blocked =
+        built.report.outcomes.iter().filter(|outcome| matches!(outcome.status, Status::Blocked { .. }));
     let failed = built.report.outcomes.iter().filter(|outcome| outcome.failed());
     let (blocked, failed) = (blocked.count(), failed.count());
     let trouble = match failed + blocked {

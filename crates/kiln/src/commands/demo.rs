@@ -33,7 +33,9 @@ const PATIENCE: Duration = Duration::from_secs(300);
 pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     if is_foreign(&args.dir) {
         let dir = args.dir.display();
-        eprintln!("error: {dir} exists and no demo made it\n  help: choose another folder: `kiln demo FOLDER`");
+        eprintln!(
+            "error: {dir} exists and no demo made it\n  help: choose another folder: `kiln demo FOLDER`"
+        );
         return Ok(ExitCode::from(INPUT_IS_WRONG));
     }
     println!("Kiln demo in {}\n", args.dir.display());
@@ -206,10 +208,14 @@ impl Demo {
         println!("{} in {}", report::count(self.written.len(), "picture"), self.frames.display());
         let dir = self.dir.display();
         if let Some(mut window) = window {
-            println!("\nThe project stays live until you close the window: edit the files in {dir} and watch.");
+            println!(
+                "\nThe project stays live until you close the window: edit the files in {dir} and watch."
+            );
             window.wait().context("waiting for the window")?;
         } else {
-            println!("\nGo on by yourself:\n  kiln watch {dir}\n  kiln preview {dir}   (in a second terminal; --headless without a display)");
+            println!(
+                "\nGo on by yourself:\n  kiln watch {dir}\n  kiln preview {dir}   (in a second terminal; --headless without a display)"
+            );
         }
         self.stop.stop();
         if let Some(daemon) = self.daemon.take()

@@ -19,7 +19,9 @@ pub(crate) fn run(args: &InitArgs) -> anyhow::Result<ExitCode> {
         println!("{:>10}  {path}", report::size(*bytes));
     }
     let dir = args.dir.display();
-    println!("\nNext:\n  kiln watch {dir}      bake, then follow every edit\n  kiln preview {dir}    look at it (in a second terminal)");
+    println!(
+        "\nNext:\n  kiln watch {dir}      bake, then follow every edit\n  kiln preview {dir}    look at it (in a second terminal)"
+    );
     Ok(ExitCode::SUCCESS)
 }
 
@@ -35,9 +37,7 @@ pub(crate) fn write_sample(dir: &Path, args: &SampleArgs) -> anyhow::Result<Vec<
 }
 
 pub(crate) fn options(args: &SampleArgs) -> kiln_sample::SampleOptions {
-    let sun = kiln_sample::sky::SunPosition {
-        elevation_deg: args.sun_elevation,
-        azimuth_deg: args.sun_azimuth,
-    };
+    let sun =
+        kiln_sample::sky::SunPosition { elevation_deg: args.sun_elevation, azimuth_deg: args.sun_azimuth };
     kiln_sample::SampleOptions { panorama_width: args.panorama_width as usize, sun }
 }

@@ -34,7 +34,13 @@ pub(crate) fn run(args: &PreviewArgs) -> anyhow::Result<ExitCode> {
     }
     let folder = place::project_folder(&args.dir)?;
     let name = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    run_window(WindowOptions { socket, title: format!("{name} — Kiln"), size: WINDOW_POINTS, selection, view })?;
+    run_window(WindowOptions {
+        socket,
+        title: format!("{name} — Kiln"),
+        size: WINDOW_POINTS,
+        selection,
+        view,
+    })?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -80,7 +86,8 @@ fn follow(
     selection: Selection,
     view: View,
 ) -> anyhow::Result<ExitCode> {
-    std::fs::create_dir_all(&args.out).with_context(|| format!("making the folder {}", args.out.display()))?;
+    std::fs::create_dir_all(&args.out)
+        .with_context(|| format!("making the folder {}", args.out.display()))?;
     let mut viewer = HeadlessViewer::new(Gpu::headless()?, args.size);
     viewer.view = view;
     viewer.select(selection);

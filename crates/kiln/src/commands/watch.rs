@@ -80,7 +80,8 @@ impl Screen {
             ServerEvent::Connected { client, name } => println!("client {client} ({name}) connected"),
             ServerEvent::Gone { client, reason } => println!("client {client} left: {reason}"),
             ServerEvent::Frame { client, report } => {
-                let since = if self.noticed_unix_ms > 0.0 { self.noticed_unix_ms } else { self.published_unix_ms };
+                let since =
+                    if self.noticed_unix_ms > 0.0 { self.noticed_unix_ms } else { self.published_unix_ms };
                 println!(
                     "  client {client} shows revision {} {} after {}",
                     report.revision,

@@ -1,0 +1,103 @@
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::mpsc::channel;
+use std::time::Duration;
+
+use notify::event::{AccessKind, CreateKind, EventKind, ModifyKind};
+
+use crate::watch::{Batch, Watch, name_changes, normalise, settle};
+
+const LIMIT: Duration = Duration::from_secs(20);
+
+fn names(files: &[&str]) -> BTreeSet<String> {
+    files.iter().map(|file| (*file).to_owned()).collect()
+}
+
+fn changes(kind: EventKind, path: &str) -> BTreeSet<String> {
+    let relevant = ["/p/kiln.toml", "/p/shaders/a.wgsl", "/p/shaders/lib/b.wgsl", "/p/shaders2/c.wgsl"];
+    let relevant: BTreeMap<PathBuf, String> = relevant
+        .iter()
+        .map(|path| (PathBuf::from(path), path.trim_start_matches("/p/").to_owned()))
+        .collect();
+    let event = notify::Event::new(kind).add_path(PathBuf::from(path));
+    name_changes(&Ok(event), Path::new("/p"), &Mutex::new(relevant))
+}
+
+#[test]
+fn event_of_a_file_is_about_that_file_alone() {
+    let modified = EventKind::Modify(ModifyKind::Any);
+    assert_eq!(changes(modified, "/p/shaders/a.wgsl"), names(&["shaders/a.wgsl"]));
+    assert!(changes(modified, "/p/baked/manifest.json").is_empty());
+    assert!(changes(EventKind::Access(AccessKind::Any), "/p/shaders/a.wgsl").is_empty());
+}
+
+#[test]
+fn event_of_a_folder_is_about_all_that_lies_below_it() {
+    let created = EventKind::Create(CreateKind::Folder);
+    assert_eq!(changes(created, "/p/shaders"), names(&["shaders/a.wgsl", "shaders/lib/b.wgsl"]));
+    assert!(changes(created, "/p").is_empty());
+}
+
+#[test]
+fn queue_overflow_is_about_everything() {
+    let relevant = Mutex::new(BTreeMap::from([(PathBuf::from("/p/a"), "a".to_owned())]));
+    let lost = notify::Event::new(EventKind::Other).set_flag(notify::event::Flag::Rescan);
+    assert_eq!(name_changes(&Ok(lost), Path::new("/p"), &relevant), names(&["a"]));
+    assert_eq!(name_changes(&Err(notify::Error::generic("gone")), Path::new("/p"), &relevant), names(&["a"]));
+}
+
+#[test]
+fn events_close_together_are_one_batch() {
+    let (sender, events) = channel();
+    for name in ["a", "b", "a", ""] {
+        sender.send(name).unwrap();
+    }
+    drop(sender);
+    let batches = Mutex::new(Vec::new());
+    let name = |name: &&str| if name.is_empty() { BTreeSet::new() } else { names(&[name]) };
+    settle(&events, &|batch: Batch| batches.lock().unwrap().push(batch.files), name);
+    assert_eq!(batches.into_inner().unwrap(), [names(&["a", "b"])]);
+}
+
+#[test]
+fn merged_batch_keeps_the_earliest_time() {
+    let batch = |files: &[&str], noticed_unix_ms| Batch { files: names(files), noticed_unix_ms };
+    let mut merged = Batch::default();
+    merged.merge(batch(&["a"], 20.0));
+    merged.merge(batch(&["b"], 10.0));
+    merged.merge(Batch::default());
+    assert_eq!(merged, batch(&["a", "b"], 10.0));
+}
+
+#[test]
+fn paths_have_one_spelling() {
+    assert_eq!(normalise(Path::new("/p/./a/../b/c")), Path::new("/p/b/c"));
+}
+
+#[test]
+fn link_to_a_file_elsewhere_is_watched_there() {
+    let (project, elsewhere) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let project = project.path().canonicalize().unwrap();
+    let elsewhere = elsewhere.path().canonicalize().unwrap();
+    fs::write(elsewhere.join("sky.hdr"), "before").unwrap();
+    std::os::unix::fs::symlink(elsewhere.join("sky.hdr"), project.join("sky.hdr")).unwrap();
+    let (sender, batches) = channel();
+    let mut watch = Watch::start(&project, move |batch| drop(sender.send(batch))).unwrap();
+    watch.set_relevant(&["sky.hdr".to_owned()]);
+    fs::write(elsewhere.join("sky.hdr"), "after").unwrap();
+    assert_eq!(batches.recv_timeout(LIMIT).unwrap().files, names(&["sky.hdr"]));
+}
+
+#[test]
+fn file_in_folders_that_appear_later_is_noticed() {
+    let project = tempfile::tempdir().unwrap();
+    let project = project.path().canonicalize().unwrap();
+    let (sender, batches) = channel();
+    let mut watch = Watch::start(&project, move |batch| drop(sender.send(batch))).unwrap();
+    watch.set_relevant(&["a/b/c/deep.wgsl".to_owned()]);
+    fs::create_dir_all(project.join("a/b/c")).unwrap();
+    fs::write(project.join("a/b/c/deep.wgsl"), "here").unwrap();
+    assert_eq!(batches.recv_timeout(LIMIT).unwrap().files, names(&["a/b/c/deep.wgsl"]));
+}
