@@ -36,11 +36,13 @@ fn demo_shows_every_edit_from_save_to_frame() {
 #[test]
 fn demo_without_a_graphics_device_still_shows_the_artefacts() {
     let project = Project::sample();
-    // No Vulkan driver and no GL library can be found under these.
+    // No Vulkan driver and no EGL vendor can be found under these.
     let environment = [
         ("VK_ICD_FILENAMES", "/nonexistent"),
         ("VK_DRIVER_FILES", "/nonexistent"),
-        ("WGPU_BACKEND", "vulkan"),
+        ("__EGL_VENDOR_LIBRARY_DIRS", "/nonexistent"),
+        ("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent"),
+        ("LIBGL_DRIVERS_PATH", "/nonexistent"),
     ];
     let (said, frames) = demo(&project, &environment);
     assert!(said.contains("no frames, only the artefacts"), "{said}");

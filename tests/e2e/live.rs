@@ -36,11 +36,7 @@ fn every_kind_of_edit_reaches_two_clients() {
     let after = expect_on_both(3);
     assert_ne!(before.part("env/sky/specular", "mip3"), after.part("env/sky/specular", "mip3"));
 
-    project.edit(
-        "scenes/material_balls.gltf",
-        "\"version\":\"2.0\"",
-        "\"version\":\"2.0\",\"copyright\":\"me\"",
-    );
+    project.edit("scenes/material_balls.gltf", "\"clearcoatFactor\": 1.0", "\"clearcoatFactor\": 0.5");
     assert_eq!(ran(&watch.published()), ["pack scene/balls"]);
     expect_on_both(4);
 

@@ -39,7 +39,7 @@ fn window_shows_revisions_and_outlives_the_daemon() {
     assert_eq!(watch.wait_for("frame")["report"]["revision"], 2);
     watch.kill();
     let watch = project.watch();
-    assert_eq!(watch.wait_for("client connected")["name"], "preview");
+    assert_eq!(watch.wait_for("client connected")["name"], "preview, window");
     assert_eq!(watch.wait_for("frame")["report"]["revision"], 1);
     assert!(window.0.try_wait().unwrap().is_none(), "the window must still be open");
 }

@@ -16,7 +16,7 @@ const CENTRE: f64 = 1.15;
 /// Texture repeats per radius at the poles.
 const REPEATS: f64 = 0.5;
 /// Around the axis: at 640×360 a facet is a pixel or two, and a software renderer pays for each triangle.
-const SEGMENTS: usize = 64;
+pub(crate) const SEGMENTS: usize = 64;
 
 /// Shell above the groove, then below it: what the material is shown on.
 pub(crate) fn shells() -> [Surface; 2] {

@@ -33,8 +33,8 @@ pub struct SampleOptions {
 
 /// Haze of the sample's sky: 2 is very clear, 10 is hazy.
 const TURBIDITY: f64 = 2.8;
-/// Baked output and the cache are made from the rest.
-const GITIGNORE: &str = "# Made by Kiln from the files beside it.\n/baked/\n/.kiln/\n";
+/// Baked output and pictures are made from the rest.
+const GITIGNORE: &str = "# Made by Kiln from the files beside it.\n/baked/\n/frames/\n";
 
 /// Every file of the sample project, sorted by path.
 pub fn files(options: &SampleOptions) -> Vec<(String, Vec<u8>)> {

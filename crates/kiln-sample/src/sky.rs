@@ -1,7 +1,7 @@
 //! A clear day: Preetham's sky, a sun of physical size and brightness, a hazy ground.
 //!
-//! Unit: 1.0 is 10 kcd/m², so a blue zenith is around 0.4, a sunlit ground around 0.6 and the midday sun
-//! around 1.5 · 10⁵, well above the largest half float: that is the hard case it exists for.
+//! Unit: 1.0 is 32 kcd/m², which exposes a sunlit white surface at about 1. A blue zenith is then around 0.13 and the
+//! midday sun around 5 · 10⁴: 400 000 times the sky beside it, the hard case for every baker.
 //!
 //! Source: Preetham, Shirley and Smits 1999, "A Practical Analytic Model for Daylight": eq. 3 (the
 //! distribution), appendix A.2 (its coefficients, zenith values) and A.1 (attenuation of sunlight).

@@ -121,7 +121,7 @@ fn surface_check_rejects_a_profile_that_runs_upwards() {
 
 /// Length of the UV step over length of the step on the surface, around and down a shell, at its ring `ring`.
 fn stretch(surface: &Surface, ring: usize) -> [f32; 2] {
-    let row = 129;
+    let row = ball::SEGMENTS + 1;
     let (here, around, down) = (ring * row, ring * row + 1, (ring + 1) * row);
     let distance = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f32>().sqrt();
     [around, down].map(|there| {
@@ -133,7 +133,7 @@ fn stretch(surface: &Surface, ring: usize) -> [f32; 2] {
 #[test]
 fn texture_is_stretched_alike_in_both_directions_from_pole_to_equator() {
     let [upper, _] = ball::shells();
-    for ring in [1, 10, 20, 38] {
+    for ring in [1, 5, 10, 18] {
         let [around, down] = stretch(&upper, ring);
         assert!((around / down - 1.0).abs() <= 0.05, "ring {ring}: {around} around, {down} down");
     }

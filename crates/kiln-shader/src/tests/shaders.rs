@@ -196,5 +196,5 @@ fn scan_finds_files_that_only_some_features_import() {
         .map(|dependency| dependency.path.as_str())
         .collect();
     assert!(found.contains("shaders/lib/sheen.wgsl"), "{found:?}");
-    assert!(!found.contains("shaders/lib/colour.wgsl"), "{found:?}");
+    assert!(!found.contains("shaders/lib/fullscreen.wgsl"), "{found:?}");
 }
