@@ -68,7 +68,7 @@ fn unknown_key_gets_a_suggestion() {
             "kiln.toml",
             "source = \"environments/studio.hdr\"",
             "sorce = \"environments/studio.hdr\"",
-        )
+        );
     });
     assert!(said.contains("unknown key `sorce`") && said.contains("did you mean `source`?"), "{said}");
     assert!(said.contains("kiln.toml:"), "{said}");

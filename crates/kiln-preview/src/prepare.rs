@@ -97,6 +97,9 @@ impl Preparer {
         let draws =
             scene.as_ref().map(|scene| self.draws(revision, scene, &shader, &environment, &mut report));
         report.shown = Selection { scene: scene_name, env };
+        // A scene's notes stand in its facts and in its GLB.
+        let mut said = std::collections::BTreeSet::new();
+        report.notes.retain(|note| said.insert(note.clone()));
         self.forget(revision, &report.shown);
         let draws = draws.unwrap_or_default();
         let frames = background

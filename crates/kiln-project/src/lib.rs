@@ -1,7 +1,7 @@
 //! A project folder: what kiln.toml says, the actions that follow from it, and the files that come out.
 //!
-//! Start at [`build`]: it plans, runs and returns every target with its state. [`Project`] is kiln.toml as
-//! data, [`plan`] turns it into a graph, [`write_outputs`] puts KTX2 files and `manifest.json` in a folder.
+//! Start at [`build()`]: it plans, runs and returns every target with its state. [`Project`] is kiln.toml as
+//! data, [`plan()`] turns it into a graph, [`write_outputs`] puts KTX2 files and `manifest.json` in a folder.
 //!
 //! Conventions: paths are relative to the project with `/`; a section of kiln.toml with an error is left
 //! out and its targets keep their last good content; a target goes away only when a project without

@@ -48,7 +48,7 @@ impl Place {
     fn new() -> Place {
         let place = Place { folder: tempfile::tempdir().unwrap(), cache: tempfile::tempdir().unwrap() };
         place.write("kiln.toml", TOML);
-        place.write("room.hdr", &panorama(1.0));
+        place.write("room.hdr", panorama(1.0));
         place.write("flat.wgsl", SHADER);
         place.write("lib/tint.wgsl", "fn tint() -> vec3f { return vec3f(1.0, 0.5, 0.25); }");
         place.write("quad.gltf", SCENE);

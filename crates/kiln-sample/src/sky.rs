@@ -1,7 +1,7 @@
 //! A clear day: Preetham's sky, a sun of physical size and brightness, a hazy ground.
 //!
-//! Unit: 1.0 is 32 kcd/m², which exposes a sunlit white surface at about 1. A blue zenith is then around 0.13 and the
-//! midday sun around 5 · 10⁴: 400 000 times the sky beside it, the hard case for every baker.
+//! Unit: 1.0 is 20 kcd/m², which exposes a sunlit white surface a little above 1. A blue zenith is then around 0.2 and
+//! the midday sun around 9 · 10⁴, above the largest half float: the hard case for every baker.
 //!
 //! Source: Preetham, Shirley and Smits 1999, "A Practical Analytic Model for Daylight": eq. 3 (the
 //! distribution), appendix A.2 (its coefficients, zenith values) and A.1 (attenuation of sunlight).
@@ -11,7 +11,7 @@ use kiln_image::{Panorama, colour};
 use std::f64::consts::PI;
 
 /// Candela per square metre of 1.0.
-pub const UNIT_CD_PER_M2: f64 = 32_000.0;
+pub const UNIT_CD_PER_M2: f64 = 20_000.0;
 
 /// Where the sun stands.
 #[derive(Clone, Copy, Debug, PartialEq)]

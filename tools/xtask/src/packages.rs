@@ -6,13 +6,15 @@ use std::process::Command;
 use crate::shell::{has_program, output_of};
 
 /// Debian's package, and how to see that what it brings is there.
-const NEEDED: [(&str, fn() -> bool); 2] = [("mesa-vulkan-drivers", has_vulkan_driver), ("xvfb", has_xvfb)];
+type Package = (&'static str, fn() -> bool);
+
+const NEEDED: [Package; 2] = [("mesa-vulkan-drivers", has_vulkan_driver), ("xvfb", has_xvfb)];
 
 fn has_vulkan_driver() -> bool {
     let folders = ["/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d", "/usr/local/share/vulkan/icd.d"];
     let has_entry =
-        |folder: &&str| Path::new(folder).read_dir().is_ok_and(|mut entries| entries.next().is_some());
-    folders.iter().any(|folder| has_entry(&folder))
+        |folder: &str| Path::new(folder).read_dir().is_ok_and(|mut entries| entries.next().is_some());
+    folders.iter().any(|folder| has_entry(folder))
 }
 
 fn has_xvfb() -> bool {

@@ -42,6 +42,6 @@ pub(crate) fn run(may_install: bool) -> Result<(), String> {
             "warnings",
         ]),
     )?;
-    let mut docs = cargo(&["doc", "--release", "--workspace", "--no-deps", "--document-private-items"]);
+    let mut docs = cargo(&["doc", "--release", "--workspace", "--no-deps"]);
     step("docs", docs.env("RUSTDOCFLAGS", "-D warnings"))
 }
