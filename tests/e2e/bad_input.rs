@@ -97,12 +97,18 @@ fn broken_source_keeps_what_was_baked_before() {
 fn folder_without_a_project_and_folder_that_is_not_there() {
     let project = Project::sample();
     std::fs::create_dir(project.beside("empty")).unwrap();
-    let output = project.command(&["bake"]).arg(project.beside("empty")).output().unwrap();
-    assert_eq!(output.status.code(), Some(1));
-    assert!(text(&output.stderr).contains("kiln init"), "{}", text(&output.stderr));
-    let output = project.command(&["bake"]).arg(project.beside("nowhere")).output().unwrap();
-    assert_ne!(output.status.code(), Some(0));
-    assert!(text(&output.stderr).contains("nowhere"), "{}", text(&output.stderr));
+    for (command, folder) in
+        [("bake", "empty"), ("bake", "nowhere"), ("watch", "empty"), ("preview", "nowhere")]
+    {
+        if command == "preview" && !cfg!(feature = "preview") {
+            continue;
+        }
+        let output = project.command(&[command]).arg(project.beside(folder)).output().unwrap();
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{command} {folder}: {said}");
+        assert!(said.contains(folder) && said.contains("kiln init"), "{command} {folder}: {said}");
+    }
+    assert_eq!(project.beside("empty").read_dir().unwrap().count(), 0, "nothing may be written there");
 }
 
 #[test]

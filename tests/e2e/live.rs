@@ -144,3 +144,27 @@ fn socket_is_for_this_user_alone() {
     assert_eq!(mode(&watch.socket), 0o600);
     assert_eq!(mode(watch.socket.parent().unwrap()), 0o700);
 }
+
+#[test]
+fn project_file_that_goes_and_comes_back_is_followed_again() {
+    let project = Project::sample();
+    let watch = project.watch();
+    let client = watch.client("viewer");
+    let before = client.revision();
+    std::fs::rename(project.path("kiln.toml"), project.path("kiln.away")).unwrap();
+    let without = client.revision();
+    assert!(without.table.diagnostics.iter().any(kiln_diagnostic::Diagnostic::is_error));
+    assert_eq!(without.table.targets["env/sky/specular"].state, TargetState::Stale);
+    std::fs::rename(project.path("kiln.away"), project.path("kiln.toml")).unwrap();
+    assert_eq!(client.revision().table.targets, before.table.targets);
+}
+
+#[test]
+fn cache_deleted_under_a_running_daemon_is_made_anew_for_the_next_client() {
+    let project = Project::sample();
+    let watch = project.watch();
+    let before = watch.client("first").revision();
+    std::fs::remove_dir_all(project.beside("cache/v1/cas")).unwrap();
+    let again = watch.client("second").revision();
+    assert_eq!(again.table.targets, before.table.targets);
+}

@@ -45,10 +45,7 @@ impl Tracker<'_> {
     /// The bytes at `path`, or `None` if there is no readable file; either way it becomes a dependency.
     pub fn read(&mut self, path: &str) -> Option<std::sync::Arc<[u8]>> {
         let bytes = self.sources.read(path);
-        let digest = match &bytes {
-            Some(bytes) => Some(Digest::of(bytes)),
-            None => self.sources.state(path).digest(),
-        };
+        let digest = bytes.as_deref().map(Digest::of);
         if !self.looked_at.iter().any(|(known, _)| known == path) {
             self.looked_at.push((path.to_owned(), digest));
         }

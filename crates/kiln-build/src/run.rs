@@ -238,6 +238,8 @@ struct RunProgress {
     /// Number of distinct unsettled actions each waits for.
     waiting_for: Vec<usize>,
     readers: Vec<Vec<usize>>,
+    /// Number of distinct actions that have still to read each one's outputs.
+    unread_by: Vec<usize>,
     ranks: Vec<u32>,
     outcomes: Vec<Option<Outcome>>,
     in_flight: usize,
@@ -288,6 +290,7 @@ impl Shared {
                 progress.readers[action].push(index);
             }
         }
+        progress.unread_by = progress.readers.iter().map(Vec::len).collect();
         Shared { progress: Mutex::new(progress), changed: Condvar::new() }
     }
 
@@ -344,11 +347,14 @@ impl Shared {
                 if matches!(settled.outcome.status, Status::Ran { .. }) {
                     progress.ended.push(graph.action(id).name.clone());
                 }
-                if let Some(record) = &settled.outcome.record {
+                if let Some(record) = &settled.outcome.record
+                    && progress.unread_by[id.0] > 0
+                {
                     let digests = record.outputs.iter().map(|output| output.digest);
                     progress.held.extend(digests.zip(settled.blobs));
                 }
                 progress.outcomes[id.0] = Some(settled.outcome);
+                progress.release_inputs(graph.action(id));
                 for reader in std::mem::take(&mut progress.readers[id.0]) {
                     progress.waiting_for[reader] -= 1;
                     if progress.waiting_for[reader] == 0 {
@@ -359,6 +365,22 @@ impl Shared {
         }
         self.changed.notify_all();
         progress.done
+    }
+}
+
+impl RunProgress {
+    /// Forgets contents that nobody has still to read: a large environment must not fill the memory until the end.
+    fn release_inputs(&mut self, action: &Action) {
+        let upstream: BTreeSet<usize> = action.inputs.iter().filter_map(upstream).collect();
+        for index in upstream {
+            self.unread_by[index] -= 1;
+            if self.unread_by[index] == 0
+                && let Some(record) =
+                    self.outcomes[index].as_ref().and_then(|outcome| outcome.record.as_ref())
+            {
+                record.outputs.iter().for_each(|output| _ = self.held.remove(&output.digest));
+            }
+        }
     }
 }
 

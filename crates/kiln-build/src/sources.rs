@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
@@ -86,9 +87,16 @@ impl SourceTree {
 
     /// The bytes at `path`; `None` if there is no readable file.
     pub fn read(&self, path: &str) -> Option<Arc<[u8]>> {
-        let bytes: Arc<[u8]> = fs::read(self.root.join(path)).ok()?.into();
+        let bytes = match read_file(&self.root.join(path)) {
+            Ok(bytes) => bytes,
+            Err(_) => {
+                // Seen as missing or unreadable, so that its appearance counts as a change.
+                self.state(path);
+                return None;
+            }
+        };
         lock(&self.seen).entry(path.to_owned()).or_insert_with(|| SourceState::Present(Digest::of(&bytes)));
-        Some(bytes)
+        Some(bytes.into())
     }
 
     /// Every path looked at since the last refresh, missing ones too: what a watcher must watch.
@@ -125,7 +133,7 @@ impl SourceTree {
         {
             return SourceState::Present(stamp.digest);
         }
-        match fs::read(&full) {
+        match read_file(&full) {
             Ok(bytes) => {
                 let digest = Digest::of(&bytes);
                 let stamp = Stamp::new(&metadata, digest, is_settled(&metadata));
@@ -135,6 +143,20 @@ impl SourceTree {
             Err(error) => SourceState::Unreadable(error.to_string()),
         }
     }
+}
+
+/// The whole of an ordinary file. What is no file (a device, a pipe) could block or never end, and is refused.
+fn read_file(path: &Path) -> std::io::Result<Vec<u8>> {
+    let metadata = fs::metadata(path)?;
+    if !metadata.is_file() {
+        return Err(std::io::Error::other("it is not a file"));
+    }
+    let mut bytes = Vec::with_capacity(usize::try_from(metadata.len().min(SOURCE_BYTES_MAX)).unwrap_or(0));
+    fs::File::open(path)?.take(SOURCE_BYTES_MAX + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > SOURCE_BYTES_MAX {
+        return Err(std::io::Error::other("it is too large"));
+    }
+    Ok(bytes)
 }
 
 fn is_settled(metadata: &fs::Metadata) -> bool {
@@ -170,7 +192,7 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 /// Reads a whole file of the tree or says why not.
 pub(crate) fn read_declared(tree: &SourceTree, path: &str, digest: Digest) -> Result<Arc<[u8]>, Error> {
     let full = tree.root.join(path);
-    let bytes = fs::read(&full).map_err(Error::io("read", &full))?;
+    let bytes = read_file(&full).map_err(Error::io("read", &full))?;
     if Digest::of(&bytes) == digest {
         return Ok(bytes.into());
     }

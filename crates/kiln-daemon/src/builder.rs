@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 use kiln_build::{Engine, Error, RunOptions, Status, Targets};
@@ -24,8 +24,21 @@ pub(crate) enum BuildResult {
 }
 
 pub(crate) struct Builder {
-    requests: Sender<Batch>,
+    requests: Option<Sender<Batch>>,
     cancel: Arc<AtomicBool>,
+    thread: Option<std::thread::JoinHandle<()>>,
+}
+
+impl Drop for Builder {
+    /// Waits for the thread, so that nothing is half written and its hold on the socket is gone when the daemon is.
+    fn drop(&mut self) {
+        self.cancel.store(true, Ordering::SeqCst);
+        drop(self.requests.take());
+        if let Some(thread) = self.thread.take() {
+            // A panic in it has been reported as a failure already.
+            let _ = thread.join();
+        }
+    }
 }
 
 pub(crate) struct BuilderOptions {
@@ -44,14 +57,16 @@ impl Builder {
         let (requests, received) = channel();
         let cancel = Arc::new(AtomicBool::new(false));
         let work = BuilderThread { engine, server, options, cancel: cancel.clone() };
-        std::thread::spawn(move || work.run(&received, &built));
-        Builder { requests, cancel }
+        let thread = std::thread::spawn(move || work.run(&received, &built));
+        Builder { requests: Some(requests), cancel, thread: Some(thread) }
     }
 
     pub(crate) fn request(&self, batch: Batch) {
         self.cancel.store(false, Ordering::SeqCst);
-        // The thread lives as long as the builder does.
-        let _ = self.requests.send(batch);
+        if let Some(requests) = &self.requests {
+            // The thread lives as long as the builder does.
+            let _ = requests.send(batch);
+        }
     }
 
     pub(crate) fn cancel(&self) {
@@ -94,20 +109,22 @@ impl BuilderThread {
     }
 
     fn build(&self, last: &Targets) -> Result<Option<Built>, Error> {
-        let report = |done, total, current: &str| {
+        let (done, total) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let report = |current: &str| {
+            let (done, total) = (done.load(Ordering::Relaxed), total.load(Ordering::Relaxed));
             self.server.report_progress(&ProgressReport { done, total, current: current.to_owned() });
         };
         let progress = |progress: kiln_build::Progress| match progress {
-            kiln_build::Progress::Started { name, .. } => report(0, 0, name),
-            kiln_build::Progress::Settled { done, total } if done == total => report(done, total, ""),
-            kiln_build::Progress::Settled { .. } => {}
+            kiln_build::Progress::Started { name, .. } => report(name),
+            kiln_build::Progress::Settled { done: now, total: all } => {
+                done.store(now, Ordering::Relaxed);
+                total.store(all, Ordering::Relaxed);
+            }
         };
         let options = RunOptions { jobs: self.options.jobs, cancel: &self.cancel, progress: &progress };
-        match build(&self.engine, last, &options) {
-            // A source that changed while it was read, or a damaged blob: the second look sees it as it is.
-            Err(_) if !self.cancel.load(Ordering::SeqCst) => build(&self.engine, last, &options),
-            result => result,
-        }
+        let result = build(&self.engine, last, &options);
+        report("");
+        result
     }
 
     /// A panic outside an action ends neither the thread nor the daemon.

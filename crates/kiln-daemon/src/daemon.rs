@@ -72,6 +72,8 @@ enum Event {
     Files(Batch),
     Built(BuildResult),
     Client(ServerEvent),
+    /// A client asked for a content that the store no longer has.
+    ContentLost,
     Stop,
 }
 
@@ -99,6 +101,10 @@ pub struct Daemon {
     published: Option<Arc<RevisionTable>>,
     /// Edits that the build in flight has not seen; `None` while no build is in flight.
     building: Option<Batch>,
+    /// A client lacks a content of what is published: the next build is published even if it changes nothing.
+    is_incomplete: bool,
+    /// Sources that are watched.
+    relevant: Vec<String>,
     _lock: ProjectLock,
 }
 
@@ -113,7 +119,15 @@ impl Daemon {
         let (sender, events) = channel();
         let name = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         let blobs = engine.clone();
-        let blobs = Box::new(move |digest: &_| blobs.store().get(digest).ok().flatten());
+        let lost = sender.clone();
+        let blobs = Box::new(move |digest: &_| {
+            let bytes = blobs.store().get(digest).ok().flatten();
+            if bytes.is_none() {
+                // Fails only when the daemon has ended.
+                let _ = lost.send(Event::ContentLost);
+            }
+            bytes
+        });
         let server =
             Server::bind(&socket, &name, blobs, client_events(sender.clone())).map_err(at(socket.clone()))?;
         let server = Arc::new(server);
@@ -135,6 +149,8 @@ impl Daemon {
             socket,
             published: None,
             building: None,
+            is_incomplete: false,
+            relevant: Vec::new(),
             _lock: lock,
         };
         daemon.begin_build(Batch::default());
@@ -158,6 +174,12 @@ impl Daemon {
             match event {
                 Event::Stop => return self.builder.cancel(),
                 Event::Client(event) => notify(Notice::Client(event)),
+                Event::ContentLost => {
+                    self.is_incomplete = true;
+                    if self.building.is_none() {
+                        self.begin_build(Batch::default());
+                    }
+                }
                 Event::Files(batch) => match &mut self.building {
                     Some(unseen) => {
                         unseen.merge(batch);
@@ -179,6 +201,7 @@ impl Daemon {
     }
 
     fn end_build(&mut self, result: BuildResult, notify: &mut dyn FnMut(Notice)) {
+        let is_failure = matches!(result, BuildResult::Failed(_));
         let mut unseen = match &result {
             // The next build may be running already.
             BuildResult::OutputsFailed(error) => return notify(Notice::Failed(error.to_string())),
@@ -193,7 +216,14 @@ impl Daemon {
         }
         // Sources that became relevant with this build may have changed before they were watched.
         let sources = self.engine.sources();
-        self.watch.set_relevant(&sources.looked_at());
+        let mut relevant = sources.looked_at();
+        relevant.push(kiln_project::PROJECT_FILE.to_owned());
+        if is_failure {
+            // A plan that broke off has not looked at everything that matters.
+            relevant.extend(std::mem::take(&mut self.relevant));
+        }
+        self.watch.set_relevant(&relevant);
+        self.relevant = relevant;
         unseen.merge(Batch::now(sources.changed_since_seen()));
         if !unseen.files.is_empty() {
             notify(Notice::Building { files: unseen.files.iter().cloned().collect() });
@@ -202,7 +232,9 @@ impl Daemon {
     }
 
     fn publish(&mut self, mut table: RevisionTable, notify: &mut dyn FnMut(Notice)) {
+        let is_incomplete = std::mem::take(&mut self.is_incomplete);
         if let Some(last) = &self.published
+            && !is_incomplete
             && last.targets == table.targets
             && last.diagnostics == table.diagnostics
         {

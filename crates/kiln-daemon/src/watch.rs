@@ -82,12 +82,13 @@ impl Watch {
             }
         }
         *self.relevant.lock().unwrap_or_else(PoisonError::into_inner) = relevant;
-        for folder in outside.difference(&self.outside) {
-            // A folder that does not exist yet cannot be watched; the next plan tries again.
-            let _ = self.watcher.watch(folder, RecursiveMode::NonRecursive);
-        }
-        self.outside.retain(|folder| outside.contains(folder));
-        self.outside.extend(outside.into_iter().filter(|folder| folder.is_dir()));
+        // A folder that cannot be watched, because it does not exist yet, is tried again after the next build.
+        let watcher = &mut self.watcher;
+        let known = &self.outside;
+        let is_watched = |folder: &PathBuf| {
+            known.contains(folder) || watcher.watch(folder, RecursiveMode::NonRecursive).is_ok()
+        };
+        self.outside = outside.into_iter().filter(is_watched).collect();
     }
 }
 

@@ -45,7 +45,7 @@ pub enum ClientEvent {
 #[derive(Debug)]
 pub struct Client {
     events: Receiver<ClientEvent>,
-    writer: Arc<Mutex<Option<UnixStream>>>,
+    writer: Arc<Mutex<Writer>>,
     stop: Option<Sender<()>>,
     thread: Option<std::thread::JoinHandle<()>>,
 }
@@ -55,7 +55,7 @@ impl Client {
     pub fn connect(socket: PathBuf, name: &str) -> Client {
         let (event_sender, events) = channel();
         let (stop, stopped) = channel();
-        let writer = Arc::new(Mutex::new(None));
+        let writer = Arc::new(Mutex::new(Writer::default()));
         let talk = Talk { socket, name: name.to_owned(), events: event_sender, writer: writer.clone() };
         let thread = std::thread::spawn(move || talk.run(&stopped));
         Client { events, writer, stop: Some(stop), thread: Some(thread) }
@@ -69,7 +69,7 @@ impl Client {
     /// Tells the daemon when a revision was seen; without a connection it is lost, and nothing depends on it.
     pub fn report_frame(&self, report: FrameReport) {
         let mut writer = self.writer.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(stream) = writer.as_mut() {
+        if let Some(stream) = writer.stream.as_mut() {
             // A broken stream is found and reported by the reading side.
             let _ = stream.write_all(&ClientMessage::Frame(report).encode());
         }
@@ -79,10 +79,13 @@ impl Client {
 impl Drop for Client {
     fn drop(&mut self) {
         drop(self.stop.take());
-        if let Some(stream) = self.writer.lock().unwrap_or_else(PoisonError::into_inner).as_ref() {
+        let mut writer = self.writer.lock().unwrap_or_else(PoisonError::into_inner);
+        writer.is_closed = true;
+        if let Some(stream) = &writer.stream {
             // Wakes the reading thread; the stream may be broken already.
             let _ = stream.shutdown(Shutdown::Both);
         }
+        drop(writer);
         if let Some(thread) = self.thread.take() {
             // It has nothing to say that was not already an event.
             let _ = thread.join();
@@ -90,11 +93,19 @@ impl Drop for Client {
     }
 }
 
+/// The sending end of the connection, while there is one.
+#[derive(Debug, Default)]
+struct Writer {
+    stream: Option<UnixStream>,
+    /// The client is being dropped: no stream may be stored any more, because nobody would shut it down.
+    is_closed: bool,
+}
+
 struct Talk {
     socket: PathBuf,
     name: String,
     events: Sender<ClientEvent>,
-    writer: Arc<Mutex<Option<UnixStream>>>,
+    writer: Arc<Mutex<Writer>>,
 }
 
 impl Talk {
@@ -106,7 +117,7 @@ impl Talk {
                 Ok(stream) => (true, self.talk(stream, &mut session)),
                 Err(error) => (false, describe_open_error(&self.socket, &error)),
             };
-            *self.writer.lock().unwrap_or_else(PoisonError::into_inner) = None;
+            self.writer.lock().unwrap_or_else(PoisonError::into_inner).stream = None;
             if was_connected || said.as_ref() != Some(&reason) {
                 said = Some(reason.clone());
                 if self.events.send(ClientEvent::Disconnected { reason }).is_err() {
@@ -125,7 +136,11 @@ impl Talk {
         transport::check_peer(&stream)?;
         let hello = ClientMessage::Hello { protocol: PROTOCOL_VERSION, name: self.name.clone() };
         stream.write_all(&hello.encode())?;
-        *self.writer.lock().unwrap_or_else(PoisonError::into_inner) = Some(stream.try_clone()?);
+        let mut writer = self.writer.lock().unwrap_or_else(PoisonError::into_inner);
+        if writer.is_closed {
+            return Err(std::io::Error::other("the client has ended"));
+        }
+        writer.stream = Some(stream.try_clone()?);
         Ok(stream)
     }
 
@@ -154,7 +169,7 @@ impl Talk {
             let reaction = session.receive(message)?;
             let mut writer = self.writer.lock().unwrap_or_else(PoisonError::into_inner);
             for message in reaction.send {
-                let stream = writer.as_mut().ok_or("the connection is closing")?;
+                let stream = writer.stream.as_mut().ok_or("the connection is closing")?;
                 stream.write_all(&message.encode()).map_err(|error| error.to_string())?;
             }
             drop(writer);

@@ -60,10 +60,13 @@ impl ClientSession {
                 self.take_chunk(digest, offset, total, &bytes)?;
                 self.commit_if_whole(&mut reaction);
             }
-            // A newer revision follows; the pending one can no longer become whole.
+            // The daemon makes it anew and publishes again; a pending revision that names it cannot become whole.
             ServerMessage::Missing(digest) => {
                 self.requested.remove(&digest);
-                self.pending = None;
+                let names = |table: &RevisionTable| {
+                    table.targets.values().flat_map(|target| &target.parts).any(|part| part.digest == digest)
+                };
+                self.pending = self.pending.take().filter(|table| !names(table));
             }
             ServerMessage::Progress(progress) => reaction.events.push(ClientEvent::Progress {
                 done: progress.done,

@@ -1,5 +1,6 @@
 //! Plan, run, resolve: one build of a project.
 
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use kiln_build::{Engine, Error, RunOptions, RunReport, Targets};
@@ -29,6 +30,28 @@ pub struct Built {
 /// # Errors
 /// The tool could not do its work (see [`Error`]); the input is not to blame.
 pub fn build(engine: &Engine, last: &Targets, options: &RunOptions) -> Result<Option<Built>, Error> {
+    let mut last = last.clone();
+    last.retain(|_, target| {
+        target.parts.iter().all(|part| engine.store().contains(&part.digest, part.bytes))
+    });
+    let mut tries = 0;
+    loop {
+        let damaged_before = engine.store().damaged_count();
+        let result = build_once(engine, &last, options);
+        // Damage is found, and dropped, one blob at a time; a source that changed while it was read is seen as it is at
+        // the second look.
+        let is_healing = engine.store().damaged_count() > damaged_before && tries < HEALING_TRIES_MAX;
+        if result.is_ok() || options.cancel.load(Ordering::SeqCst) || !(is_healing || tries == 0) {
+            return result;
+        }
+        tries += 1;
+    }
+}
+
+/// More damaged blobs than this in one build are a broken disk.
+const HEALING_TRIES_MAX: usize = 64;
+
+fn build_once(engine: &Engine, last: &Targets, options: &RunOptions) -> Result<Option<Built>, Error> {
     let start = Instant::now();
     let plan = plan(engine)?;
     let plan_ms = start.elapsed().as_secs_f64() * 1e3;

@@ -137,7 +137,7 @@ fn read_root<'a>(document: &mut Document<'a>, root: &DeTable<'a>, project: &mut 
                 }
             }),
             "output" => read_single(document, "output", value, |section| {
-                if let Some(dir) = section.text("dir") {
+                if let Some(dir) = read_output_dir(section) {
                     project.output_dir = dir;
                 }
             }),
@@ -224,6 +224,19 @@ fn as_table<'v, 'a>(
 fn is_name(name: &str) -> bool {
     let fits = |character: char| character.is_ascii_alphanumeric() || "-_".contains(character);
     !name.is_empty() && name.len() <= 80 && name.chars().all(fits)
+}
+
+/// A folder of its own inside the project: files in it are overwritten and removed.
+fn read_output_dir(section: &mut Section) -> Option<String> {
+    let place = section.place("dir");
+    let dir = section.text("dir")?;
+    let is_inside = !dir.is_empty() && dir.split('/').all(|part| !["", ".", ".."].contains(&part));
+    if !is_inside || dir.contains('\\') || dir.contains(':') {
+        let help = "name a folder inside the project that holds nothing else, as `dir = \"baked\"`";
+        section.fail(format!("`dir` in [output] is `{dir}`"), place, Some(help.to_owned()));
+        return None;
+    }
+    Some(dir)
 }
 
 fn read_env(section: &mut Section) -> EnvConfig {

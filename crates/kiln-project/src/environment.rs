@@ -3,14 +3,14 @@
 use std::sync::Arc;
 
 use kiln_bake::{Accuracy, Analysis, AnalysisRequest, EncodedLevel, TexelFormat};
-use kiln_build::{Action, ActionId, ActionOutput, Engine, Error, Input, Inputs, SourceState};
+use kiln_build::{Action, ActionId, ActionOutput, Engine, Error, Input, Inputs};
 use kiln_diagnostic::Diagnostic;
 use kiln_image::{Cube, Decoded, Limits, Panorama, TexelPolicy, check_texels};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::blob::{decode_panorama, encode_panorama};
-use crate::plan::{PartSpec, Planner, rank};
+use crate::plan::{PartSpec, Planner, no_content, rank, unreadable};
 use crate::{EnvConfig, Range};
 
 /// Levels of a specular chain end at this face size: smaller ones cannot carry a rough lobe's gradient
@@ -27,6 +27,10 @@ const SH_CONVENTION: &str = "value(direction) = sum over l, m of c[l(l+1)+m] Y_l
 /// The environment at the size of the specular chain's first level: an output of the skybox action, which has that
 /// level already unless the chain is larger than the skybox.
 const MIRROR: &str = "mirror";
+
+/// The one output of an action that makes one level. Which level of which target it becomes is not the action's business:
+/// equal maps share a key.
+const LEVEL: &str = "level";
 
 /// What later steps must know of a decoded panorama without reading it.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -47,7 +51,12 @@ pub(crate) fn plan_environment(planner: &mut Planner, engine: &Engine, name: &st
     let target = |map: &str| format!("env/{name}/{map}");
     planner.target(target("skybox"), "cube", json!({}), vec![PartSpec::Levels(skybox)]);
     let meta = json!({"size": env.irradiance_size, "levels": 1});
-    planner.target(target("irradiance"), "cube", meta, vec![PartSpec::one(irradiance, "mip0")]);
+    planner.target(
+        target("irradiance"),
+        "cube",
+        meta,
+        vec![PartSpec::One { action: irradiance, output: LEVEL.to_owned(), part: "mip0".to_owned() }],
+    );
     planner.target(target("sh"), "sh", json!({"order": SH_ORDER}), vec![PartSpec::one(sh, "json")]);
     let count = specular_level_count(env.size);
     let levels = (0..count).map(|level| {
@@ -56,7 +65,8 @@ pub(crate) fn plan_environment(planner: &mut Planner, engine: &Engine, name: &st
         if level == 0 {
             return PartSpec::One { action: skybox, output: MIRROR.to_owned(), part };
         }
-        PartSpec::one(planner.graph.add(steps.specular_level(decode, analyse, level, count)), &part)
+        let action = planner.graph.add(steps.specular_level(decode, analyse, level, count));
+        PartSpec::One { action, output: LEVEL.to_owned(), part }
     });
     let levels = levels.collect();
     let meta = json!({"size": env.size, "levels": count, "law": "roughness = mip / (levels - 1)"});
@@ -95,21 +105,17 @@ impl Steps<'_> {
         let source = engine.source(&self.env.source);
         let input = Input::Source { path: self.env.source.clone(), digest: source.digest() };
         let (path, name, policy) = (self.env.source.clone(), self.name.to_owned(), self.env.texels);
-        // A file that is there but cannot be read must not share the key of one that is missing.
-        let unreadable = match source {
-            SourceState::Unreadable(reason) => Some(reason),
-            SourceState::Present(_) | SourceState::Missing => None,
-        };
-        let params = json!({"texels": policy_name(policy), "unreadable": unreadable});
+        let unreadable = unreadable(engine, &path);
+        // Its messages name both.
+        let params =
+            json!({"texels": policy_name(policy), "unreadable": unreadable, "env": name, "source": path});
         self.action("", ("decode", 1), params, vec![input], move |inputs| {
-            Ok(match (inputs.bytes(0)?, &unreadable) {
-                (Some(bytes), _) => decode(&bytes, &path, policy),
-                (None, Some(reason)) => failure(Diagnostic::error(reason.clone()).in_file(&*path)),
-                (None, None) => failure(
-                    Diagnostic::error("the environment's file was not found")
-                        .in_file(&*path)
-                        .with_help(format!("create it, or correct `source` in [env.{name}] of kiln.toml")),
-                ),
+            Ok(match inputs.bytes(0)? {
+                Some(bytes) => decode(&bytes, &path, policy),
+                None => {
+                    let section = format!("env.{name}");
+                    failure(no_content("environment", &path, unreadable.as_deref(), &section))
+                }
             })
         })
     }
@@ -131,6 +137,8 @@ impl Steps<'_> {
         let inputs = vec![output(decode, "panorama"), output(decode, "report")];
         let mut params = self.encoding();
         params["mirror_size"] = json!(env.size);
+        // Its note names the file.
+        params["source"] = json!(env.source);
         self.action("", ("skybox", 1), params, inputs, move |inputs| {
             let panorama = panorama(inputs, 0)?;
             let report = report(inputs, 1)?;
@@ -161,11 +169,7 @@ impl Steps<'_> {
         let inputs = vec![output(analyse, "analysis"), output(decode, "report")];
         self.action("", ("irradiance", 1), params, inputs, move |inputs| {
             let map = kiln_bake::irradiance(&analysis(inputs, 0)?, env.irradiance_size);
-            Ok(Encode::new(&env, &report(inputs, 1)?).output(
-                "mip0",
-                &map.cube,
-                accuracy_facts(&map.accuracy),
-            ))
+            Ok(Encode::new(&env, &report(inputs, 1)?).output(LEVEL, &map.cube, accuracy_facts(&map.accuracy)))
         })
     }
 
@@ -197,7 +201,7 @@ impl Steps<'_> {
             let map = kiln_bake::specular_level(&analysis(inputs, 0)?, roughness * roughness, face_size);
             let mut detail = accuracy_facts(&map.accuracy);
             detail["roughness"] = json!(roughness);
-            Ok(Encode::new(&env, &report(inputs, 1)?).output(&format!("mip{level}"), &map.cube, detail))
+            Ok(Encode::new(&env, &report(inputs, 1)?).output(LEVEL, &map.cube, detail))
         })
     }
 }

@@ -64,13 +64,21 @@ pub struct Written {
 /// A file cannot be read from the store or written.
 pub fn write_outputs(store: &Store, targets: &Targets, folder: &Path) -> Result<Written, Error> {
     let old = read_manifest(folder);
+    let unchanged = |name: &String, target: &Target| {
+        let known = old.targets.get(name)?;
+        (known.sha256 == target.digest() && all_present(folder, known)).then_some(known)
+    };
     let mut manifest = Manifest { schema: MANIFEST_SCHEMA, ..Manifest::default() };
     let mut written = Written::default();
+    let kept =
+        targets.iter().filter_map(|(name, target)| Some((name.clone(), unchanged(name, target)?.clone())));
+    manifest.targets.extend(kept);
+    if manifest.targets.len() < targets.len() && manifest != old {
+        // Until the files are written nothing may vouch for them.
+        write_manifest(folder, &manifest)?;
+    }
     for (name, target) in targets {
-        let sha256 = target.digest();
-        let known =
-            old.targets.get(name).filter(|known| known.sha256 == sha256 && all_present(folder, known));
-        let files = match known {
+        let files = match manifest.targets.get(name) {
             Some(known) => {
                 written.kept += known.files.len();
                 known.files.clone()
@@ -79,7 +87,7 @@ pub fn write_outputs(store: &Store, targets: &Targets, folder: &Path) -> Result<
         };
         let entry = ManifestTarget {
             kind: target.kind.clone(),
-            sha256,
+            sha256: target.digest(),
             state: target.state,
             files,
             facts: target.meta.clone(),
@@ -88,12 +96,16 @@ pub fn write_outputs(store: &Store, targets: &Targets, folder: &Path) -> Result<
     }
     remove_orphans(folder, &old, &manifest, &mut written);
     if manifest != old {
-        let mut text = serde_json::to_string_pretty(&manifest).unwrap_or_default();
-        text.push('\n');
-        write_atomically(&folder.join(MANIFEST_FILE), text.as_bytes())?;
+        write_manifest(folder, &manifest)?;
         written.written.push(MANIFEST_FILE.to_owned());
     }
     Ok(written)
+}
+
+fn write_manifest(folder: &Path, manifest: &Manifest) -> Result<(), Error> {
+    let mut text = serde_json::to_string_pretty(manifest).unwrap_or_default();
+    text.push('\n');
+    write_atomically(&folder.join(MANIFEST_FILE), text.as_bytes())
 }
 
 /// A manifest that is missing, damaged or of another schema says nothing about the folder.

@@ -1,7 +1,8 @@
 //! From kiln.toml and the sources to a graph of actions and the targets they make.
 
 use kiln_build::{
-    ActionId, ActionRecord, Engine, Error, Graph, OutputRecord, Part, RunReport, Target, TargetState, Targets,
+    ActionId, ActionRecord, Engine, Error, Graph, OutputRecord, Part, RunReport, SourceState, Target,
+    TargetState, Targets,
 };
 use kiln_diagnostic::{Diagnostic, has_errors};
 use serde_json::{Map, Value, json};
@@ -102,6 +103,27 @@ impl Planner {
     }
 }
 
+/// Why a source that is there cannot be read. Part of the parameters of the action that reports it, so that such a file
+/// does not share the key of a missing one.
+pub(crate) fn unreadable(engine: &Engine, path: &str) -> Option<String> {
+    match engine.source(path) {
+        SourceState::Unreadable(reason) => Some(reason),
+        SourceState::Present(_) | SourceState::Missing => None,
+    }
+}
+
+/// What to say of a source without content.
+pub(crate) fn no_content(what: &str, path: &str, unreadable: Option<&str>, section: &str) -> Diagnostic {
+    match unreadable {
+        Some(reason) => {
+            Diagnostic::error(format!("the {what}'s file cannot be read: {reason}")).in_file(path)
+        }
+        None => Diagnostic::error(format!("the {what}'s file was not found"))
+            .in_file(path)
+            .with_help(format!("create it, or correct `source` in [{section}] of kiln.toml")),
+    }
+}
+
 /// Plans a project: reads kiln.toml, scans scenes and shaders for what they need.
 ///
 /// # Errors
@@ -166,7 +188,14 @@ impl Plan {
         for spec in &self.targets {
             if let Some(target) = resolve_target(spec, report) {
                 targets.insert(spec.name.clone(), target);
-            } else if let Some(target) = last.get(&spec.name) {
+                continue;
+            }
+            if spec.parts.iter().all(|part| report.outcome(part.action()).succeeded()) {
+                let message =
+                    format!("`{}` was made, but not all of its parts; this is a fault of Kiln", spec.name);
+                diagnostics.push(Diagnostic::error(message));
+            }
+            if let Some(target) = last.get(&spec.name) {
                 targets.insert(spec.name.clone(), target.clone().into_stale());
             }
         }

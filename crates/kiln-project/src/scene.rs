@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use crate::SceneConfig;
 use crate::environment::failure;
-use crate::plan::{PartSpec, Planner, rank};
+use crate::plan::{PartSpec, Planner, no_content, rank, unreadable};
 use crate::shader::Variants;
 
 /// What a scan of a scene tells the planner.
@@ -40,12 +40,14 @@ pub(crate) fn plan_scene(
     }
     let inputs =
         scan.looked_at.iter().map(|(path, digest)| Input::Source { path: path.clone(), digest: *digest });
-    let (source, paths) = (config.source.clone(), scan.looked_at.clone());
+    let (source, paths, section) = (config.source.clone(), scan.looked_at.clone(), format!("scene.{name}"));
+    let unreadable = unreadable(engine, &source);
     let pack = planner.graph.add(Action {
         name: format!("pack scene/{name}"),
         kind: "pack",
         recipe: PACK_RECIPE,
-        params: json!({}),
+        // Its messages name them.
+        params: json!({"source": source, "section": section, "unreadable": unreadable}),
         inputs: inputs.collect(),
         rank: rank::SCENE,
         perform: Arc::new(move |inputs| {
@@ -53,7 +55,11 @@ pub(crate) fn plan_scene(
             for (index, (path, _)) in paths.iter().enumerate() {
                 contents.insert(path.as_str(), inputs.bytes(index)?);
             }
-            Ok(pack_scene(&source, &mut |path| contents.get(path).cloned().flatten()))
+            let mut read = |path: &str| contents.get(path).cloned().flatten();
+            Ok(match read(&source) {
+                Some(bytes) => pack_scene(&source, &bytes, &mut read),
+                None => failure(no_content("scene", &source, unreadable.as_deref(), &section)),
+            })
         }),
     });
     let meta = json!({"env": config.env, "shader": config.shader});
@@ -73,12 +79,8 @@ fn scan_scene(source: &str, tracker: &mut Tracker) -> (Value, Vec<Diagnostic>) {
     (json!(SceneScan { effect_sets: sets.into_iter().map(names).collect() }), Vec::new())
 }
 
-fn pack_scene(source: &str, read: &mut dyn FnMut(&str) -> Option<Arc<[u8]>>) -> ActionOutput {
-    let Some(bytes) = read(source) else {
-        let missing = Diagnostic::error("the scene's file was not found").in_file(source);
-        return failure(missing.with_help("create it, or correct `source` in kiln.toml"));
-    };
-    let packed = kiln_scene::pack(source, &bytes, read);
+fn pack_scene(source: &str, bytes: &[u8], read: &mut dyn FnMut(&str) -> Option<Arc<[u8]>>) -> ActionOutput {
+    let packed = kiln_scene::pack(source, bytes, read);
     let Some(glb) = packed.glb.filter(|_| !has_errors(&packed.diagnostics)) else {
         return ActionOutput { diagnostics: packed.diagnostics, ..ActionOutput::default() };
     };

@@ -4,11 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use kiln_build::{Action, ActionOutput, Engine, Error, Input};
-use kiln_diagnostic::Diagnostic;
 use serde_json::{Value, json};
 
 use crate::environment::{failure, success};
-use crate::plan::{PartSpec, Planner, rank};
+use crate::plan::{PartSpec, Planner, no_content, rank, unreadable};
 use crate::{Role, ShaderConfig};
 
 /// Edge of the BRDF table, in texels.
@@ -56,12 +55,19 @@ pub(crate) fn plan_shader(
         let inputs = scan.looked_at.iter();
         let inputs = inputs.map(|(path, digest)| Input::Source { path: path.clone(), digest: *digest });
         let meta = json!({"shader": name, "role": config.role.name(), "features": features});
-        let (root, paths) = (config.source.clone(), scan.looked_at.clone());
+        let (root, paths, section) =
+            (config.source.clone(), scan.looked_at.clone(), format!("shader.{name}"));
+        let unreadable = unreadable(engine, &root);
         let compile = planner.graph.add(Action {
             name: format!("compile {target}"),
             kind: "compile",
             recipe: COMPILE_RECIPE,
-            params: json!({"root": config.source, "features": features}),
+            params: json!({
+                "root": root,
+                "features": features,
+                "section": section,
+                "unreadable": unreadable,
+            }),
             inputs: inputs.collect(),
             rank: rank::SHADER,
             perform: Arc::new(move |inputs| {
@@ -69,7 +75,11 @@ pub(crate) fn plan_shader(
                 for (index, (path, _)) in paths.iter().enumerate() {
                     contents.insert(path.as_str(), inputs.bytes(index)?);
                 }
-                Ok(compile(&root, &features, &contents))
+                let mut read = |path: &str| contents.get(path).cloned().flatten().map(|bytes| text(&bytes));
+                Ok(match read(&root) {
+                    Some(_) => compile(&root, &features, &mut read),
+                    None => failure(no_content("shader", &root, unreadable.as_deref(), &section)),
+                })
             }),
         });
         let parts = vec![PartSpec::one(compile, "wgsl"), PartSpec::one(compile, "reflection")];
@@ -81,14 +91,9 @@ pub(crate) fn plan_shader(
 fn compile(
     root: &str,
     features: &BTreeSet<String>,
-    contents: &BTreeMap<&str, Option<Arc<[u8]>>>,
+    read: &mut dyn FnMut(&str) -> Option<Arc<str>>,
 ) -> ActionOutput {
-    let mut read = |path: &str| contents.get(path).cloned().flatten().map(|bytes| text(&bytes));
-    if read(root).is_none() {
-        let missing = Diagnostic::error("the shader's file was not found").in_file(root);
-        return failure(missing.with_help("create it, or correct `source` in kiln.toml"));
-    }
-    let outcome = kiln_shader::compile(root, features, &mut read);
+    let outcome = kiln_shader::compile(root, features, read);
     let diagnostics = outcome.diagnostics;
     let Some(compiled) = outcome.compiled else { return ActionOutput { diagnostics, ..Default::default() } };
     let reflection = serde_json::to_vec(&compiled.reflection).unwrap_or_default();

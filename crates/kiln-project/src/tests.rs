@@ -273,6 +273,9 @@ fn wrong_project_files_are_explained() {
             "did you mean `sky`?",
             6,
         ),
+        ("version = 1\n[output]\ndir = \"../..\"\n", "folder inside the project", 3),
+        ("version = 1\n[output]\ndir = \"/etc\"\n", "folder inside the project", 3),
+        ("version = 1\n[output]\ndir = \".\"\n", "folder inside the project", 3),
         ("version = 1\n[env.a\nsource = \"a.hdr\"\n", "", 2),
         ("version = 1\n[env.\"a/b\"]\nsource = \"a.hdr\"\n", "letters, digits", 2),
     ];
@@ -312,4 +315,54 @@ fn each_texture_states_its_own_size() {
         let meta = &targets[&format!("env/room/{name}")].meta;
         assert_eq!((meta["size"].as_u64(), meta["levels"].as_u64()), (Some(size), Some(levels)), "{name}");
     }
+}
+
+/// The last level of every chain is the same map, so both share its action's result.
+#[test]
+fn smaller_chain_of_a_uniform_environment_is_complete() {
+    let place = Place::new();
+    let grey = Image::new(16, 8, vec![0.5; 16 * 8 * 3]).unwrap();
+    place.write("room.hdr", kiln_image::hdr::encode(&grey));
+    place.build();
+    place.edit("kiln.toml", "size = 8\n", "size = 16\n");
+    let larger = place.build().targets["env/room/specular"].clone();
+    assert_eq!((larger.parts.len(), larger.state), (3, TargetState::Fresh));
+    place.edit("kiln.toml", "size = 16\n", "size = 8\n");
+    let smaller = place.build().targets["env/room/specular"].clone();
+    assert_eq!((smaller.parts.len(), smaller.state), (2, TargetState::Fresh));
+    assert_eq!(smaller.parts[1].name, "mip1");
+}
+
+#[test]
+fn every_flipped_bit_in_the_store_is_healed_by_the_next_build_and_write() {
+    let place = Place::new();
+    let good = place.build().targets;
+    for folder in fs::read_dir(place.cache.path().join("v1/cas")).unwrap() {
+        for blob in fs::read_dir(folder.unwrap().path()).unwrap() {
+            let path = blob.unwrap().path();
+            let mut bytes = fs::read(&path).unwrap();
+            bytes[0] ^= 1;
+            fs::write(&path, bytes).unwrap();
+        }
+    }
+    let engine = Engine::open(place.folder.path(), place.cache.path()).unwrap();
+    for _ in 0..64 {
+        let targets = place.build().targets;
+        if write_outputs(engine.store(), &targets, &place.folder.path().join("baked")).is_ok() {
+            assert_eq!(targets, good);
+            return;
+        }
+    }
+    panic!("the store did not heal");
+}
+
+#[cfg(unix)]
+#[test]
+fn source_that_is_no_file_is_refused_and_blocks_nothing() {
+    let place = Place::new();
+    place.edit("kiln.toml", "source = \"flat.wgsl\"", "source = \"endless.wgsl\"");
+    std::os::unix::fs::symlink("/dev/zero", place.folder.path().join("endless.wgsl")).unwrap();
+    let built = place.build();
+    let text: String = errors(&built).iter().map(|error| error.to_string()).collect();
+    assert!(text.contains("endless.wgsl") && text.contains("it is not a file"), "{text}");
 }

@@ -116,7 +116,7 @@ pub(crate) struct PreviewArgs {
     #[arg(long, default_value_t = 1, requires = "headless")]
     pub(crate) wait_revision: u64,
     /// Give up after this many seconds
-    #[arg(long, default_value_t = 60, requires = "headless")]
+    #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..=86_400), requires = "headless")]
     pub(crate) timeout_s: u64,
     /// Scene to show [default: the project's first]
     #[arg(long)]

@@ -25,7 +25,14 @@ pub(crate) const INPUT_IS_WRONG: u8 = 1;
 pub(crate) const TOOL_FAILED: u8 = 2;
 
 fn main() -> ExitCode {
-    let args = args::Args::parse();
+    let args = match args::Args::try_parse() {
+        Ok(args) => args,
+        Err(asked) => {
+            // Help and version are errors to clap, but not to the user; a closed pipe is nothing to report.
+            let _ = asked.print();
+            return if asked.use_stderr() { ExitCode::from(INPUT_IS_WRONG) } else { ExitCode::SUCCESS };
+        }
+    };
     let result = match args.command {
         args::Command::Init(args) => commands::init::run(&args),
         args::Command::Bake(args) => commands::bake::run(&args),
@@ -35,6 +42,10 @@ fn main() -> ExitCode {
         args::Command::Demo(args) => commands::demo::run(&args),
     };
     result.unwrap_or_else(|error| {
+        if error.is::<place::WrongInput>() {
+            eprintln!("error: {error}");
+            return ExitCode::from(INPUT_IS_WRONG);
+        }
         eprintln!("kiln: {error:#}");
         ExitCode::from(TOOL_FAILED)
     })

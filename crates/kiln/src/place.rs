@@ -30,9 +30,28 @@ pub(crate) fn socket_of(dir: &Path) -> anyhow::Result<PathBuf> {
     kiln_link::socket_path(&folder).context("finding the project's socket")
 }
 
+/// What was asked for cannot be done: the request is wrong, not the tool.
+#[derive(Debug)]
+pub(crate) struct WrongInput(String);
+
+impl std::fmt::Display for WrongInput {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for WrongInput {}
+
 /// The canonical folder of a project.
 pub(crate) fn project_folder(dir: &Path) -> anyhow::Result<PathBuf> {
-    dir.canonicalize().with_context(|| format!("there is no folder {}", dir.display()))
+    let folder = dir.canonicalize().ok().filter(|folder| folder.join(kiln_project::PROJECT_FILE).is_file());
+    folder.ok_or_else(|| {
+        let dir = dir.display();
+        let what = format!(
+            "there is no kiln.toml in {dir}\n  help: `kiln init {dir}` makes a project that runs as it is"
+        );
+        WrongInput(what).into()
+    })
 }
 
 /// Whether a window could be opened.

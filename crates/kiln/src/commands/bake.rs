@@ -14,10 +14,19 @@ use crate::args::BakeArgs;
 use crate::{INPUT_IS_WRONG, place, report};
 
 pub(crate) fn run(args: &BakeArgs) -> anyhow::Result<ExitCode> {
-    let engine = Engine::open(&args.build.dir, &place::cache_folder()?).context("opening the project")?;
-    let built = build_with_progress(&engine, place::jobs(args.build.jobs))?;
-    let folder = engine.folder().join(&built.plan.project.output_dir);
-    let written = write_outputs(engine.store(), &built.targets, &folder).context("writing baked files")?;
+    let engine = Engine::open(&place::project_folder(&args.build.dir)?, &place::cache_folder()?)
+        .context("opening the project")?;
+    let (built, written) = loop {
+        let damaged_before = engine.store().damaged_count();
+        let built = build_with_progress(&engine, place::jobs(args.build.jobs))?;
+        let folder = engine.folder().join(&built.plan.project.output_dir);
+        match write_outputs(engine.store(), &built.targets, &folder) {
+            Ok(written) => break (built, written),
+            // A damaged artefact was found and dropped: the next build makes it anew.
+            Err(_) if engine.store().damaged_count() > damaged_before => {}
+            Err(error) => return Err(error).context("writing baked files"),
+        }
+    };
     if args.build.json {
         println!("{:#}", to_json(&built, &written));
     } else {
@@ -45,8 +54,7 @@ fn build_with_progress(engine: &Engine, jobs: usize) -> anyhow::Result<Built> {
     let cancel = AtomicBool::new(false);
     let options = RunOptions { jobs, cancel: &cancel, progress: &progress };
     let last = engine.last_targets();
-    // A source that changed while it was read, or a damaged blob: the second look sees it as it is.
-    let built = build(engine, &last, &options).or_else(|_| build(engine, &last, &options));
+    let built = build(engine, &last, &options);
     bar.finish_and_clear();
     built.context("building")?.context("the build was cancelled")
 }

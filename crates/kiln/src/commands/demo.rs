@@ -124,7 +124,7 @@ impl Demo {
         let old = std::fs::read(&path).with_context(|| format!("reading {}", path.display()))?;
         let new = (edit.change)(&old)?;
         let saved = unix_ms();
-        std::fs::write(&path, new).with_context(|| format!("writing {}", path.display()))?;
+        kiln_build::write_atomically(&path, &new)?;
         let (revision, received) = self.next_revision()?;
         if has_errors(&revision.table.diagnostics) != edit.breaks {
             report::print_diagnostics(&revision.table.diagnostics, true);
