@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, bail};
+use anyhow::bail;
 
 /// The store: `KILN_CACHE`, or `kiln` in the user's cache folder.
 pub(crate) fn cache_folder() -> anyhow::Result<PathBuf> {
@@ -26,8 +26,8 @@ pub(crate) fn jobs(asked: Option<usize>) -> usize {
 /// The socket of the project in `dir`.
 #[cfg(feature = "preview")]
 pub(crate) fn socket_of(dir: &Path) -> anyhow::Result<PathBuf> {
-    let folder = project_folder(dir)?;
-    kiln_link::socket_path(&folder).context("finding the project's socket")
+    use anyhow::Context as _;
+    kiln_link::socket_path(&project_folder(dir)?).context("finding the project's socket")
 }
 
 /// What was asked for cannot be done: the request is wrong, not the tool.
