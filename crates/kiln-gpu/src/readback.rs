@@ -2,6 +2,9 @@
 
 use crate::{Gpu, GpuError};
 
+/// How long an answer that is on its way may take to be delivered.
+const ANSWER_LIMIT: std::time::Duration = std::time::Duration::from_secs(10);
+
 impl Gpu {
     /// Reads one level of a texture: its layers in order, rows tightly packed, texels as the device stores them.
     /// Waits until the device has done everything submitted so far.
@@ -74,7 +77,9 @@ impl Gpu {
         buffer.map_async(wgpu::MapMode::Read, .., move |mapped| drop(sender.send(mapped)));
         self.wait()?;
         let failed = |reason: String| GpuError::Readback { reason };
-        let mapped = receiver.try_recv().map_err(|_| failed("the map never ended".to_owned()))?;
+        // Another thread that polls the same device may have taken over the answer and still be about to deliver it.
+        let mapped =
+            receiver.recv_timeout(ANSWER_LIMIT).map_err(|_| failed("the map never ended".to_owned()))?;
         mapped.map_err(|error| failed(error.to_string()))?;
         let bytes = buffer.get_mapped_range(..).map_err(|error| failed(error.to_string()))?.to_vec();
         buffer.unmap();
