@@ -6,6 +6,7 @@
 
 mod bad_input;
 mod bake;
+mod ci;
 mod corpus;
 mod demo;
 #[cfg(feature = "preview")]

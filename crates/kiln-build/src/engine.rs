@@ -1,27 +1,38 @@
 //! Store, sources and memory of one project together.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use kiln_diagnostic::Diagnostic;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::digest::FieldHasher;
+use crate::memory::{Memory, ScanMemory};
 use crate::sources::lock;
-use crate::store::write_json;
-use crate::{Digest, Error, ProjectState, SourceState, SourceTree, Store, Targets};
+use crate::{
+    ActionRecord, BuildNote, ChangeNote, Digest, Error, Graph, SourceState, SourceTree, Store, Targets,
+};
 
-/// How many earlier results of a scan are kept, so that a reverted edit finds its old one.
+/// How many results of a scan are kept for one content of its root: its other files may have been edited and put back.
 const SCAN_RESULTS_KEPT: usize = 8;
+const MEMORY_FILE: &str = "memory.json";
+pub(crate) const PUBLISHED_FILE: &str = "published.json";
+const OUTPUT_LOCK_FILE: &str = "output.lock";
 
 /// The engine of one project.
 #[derive(Debug)]
 pub struct Engine {
     store: Store,
     sources: SourceTree,
-    state: Mutex<ProjectState>,
+    outputs: SourceTree,
+    memory: Mutex<Memory>,
+    /// Read when it is needed first.
+    published: Mutex<Option<Arc<Targets>>>,
     folder: PathBuf,
+    /// Names the project in the store.
+    project: Digest,
 }
 
 /// What a scan found.
@@ -35,6 +46,14 @@ pub struct Scan {
     pub diagnostics: Vec<Diagnostic>,
 }
 
+/// What a project published last, and whose it is.
+#[derive(Serialize, Deserialize)]
+pub(crate) struct Published {
+    pub(crate) host: String,
+    pub(crate) folder: String,
+    pub(crate) targets: Targets,
+}
+
 /// The eyes of a running scan: notes every source that is looked at.
 pub struct Tracker<'a> {
     sources: &'a SourceTree,
@@ -43,7 +62,7 @@ pub struct Tracker<'a> {
 
 impl Tracker<'_> {
     /// The bytes at `path`, or `None` if there is no readable file; either way it becomes a dependency.
-    pub fn read(&mut self, path: &str) -> Option<std::sync::Arc<[u8]>> {
+    pub fn read(&mut self, path: &str) -> Option<Arc<[u8]>> {
         let bytes = self.sources.read(path);
         let digest = bytes.as_deref().map(Digest::of);
         if !self.looked_at.iter().any(|(known, _)| known == path) {
@@ -54,13 +73,18 @@ impl Tracker<'_> {
 }
 
 impl Engine {
-    /// Opens the project in `folder` with the store below `cache`.
-    pub fn open(folder: &Path, cache: &Path) -> Result<Engine, Error> {
+    /// Opens the project in `folder` with a store.
+    ///
+    /// # Errors
+    /// The folder cannot be found or the store cannot be read.
+    pub fn open(folder: &Path, store: Store) -> Result<Engine, Error> {
         let folder = folder.canonicalize().map_err(Error::io("find the folder", folder))?;
-        let store = Store::open(cache)?;
-        let state = ProjectState::load(&store, &folder)?;
-        let sources = SourceTree::new(folder.clone(), state.stamps.clone());
-        Ok(Engine { store, sources, state: Mutex::new(state), folder })
+        let project = Digest::of(folder.as_os_str().as_encoded_bytes());
+        let mut memory: Memory = store.project_document(&project, MEMORY_FILE)?.unwrap_or_default();
+        let sources = SourceTree::new(folder.clone(), std::mem::take(&mut memory.source_stamps));
+        let outputs = SourceTree::new(folder.clone(), std::mem::take(&mut memory.output_stamps));
+        let memory = Mutex::new(memory);
+        Ok(Engine { store, sources, outputs, memory, published: Mutex::default(), folder, project })
     }
 
     /// The artefacts.
@@ -73,44 +97,141 @@ impl Engine {
         &self.sources
     }
 
+    /// The files that builds wrote into the project's folder.
+    pub fn outputs(&self) -> &SourceTree {
+        &self.outputs
+    }
+
     /// The project's folder, canonical.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// What was published last.
-    pub fn last_targets(&self) -> Targets {
-        lock(&self.state).targets.clone()
+    /// What is at a source path, for planning.
+    pub fn source(&self, path: &str) -> SourceState {
+        self.sources.state(path)
     }
 
-    /// Keeps what is published now, and the engine's own memory, for the next process.
-    pub fn save(&self, targets: Targets) -> Result<(), Error> {
-        let mut state = lock(&self.state);
-        let stamps = self.sources.stamps();
-        if state.targets == targets && state.stamps == stamps && !state.dirty {
+    /// What was published last, as far as its contents are still there: the last good content of every target.
+    ///
+    /// # Errors
+    /// It is there and cannot be read.
+    pub fn published(&self) -> Result<Arc<Targets>, Error> {
+        let mut published = lock(&self.published);
+        if let Some(targets) = &*published {
+            return Ok(targets.clone());
+        }
+        let found: Option<Published> = self.store.project_document(&self.project, PUBLISHED_FILE)?;
+        let mut targets = found.map(|found| found.targets).unwrap_or_default();
+        targets.retain(|_, target| {
+            target.parts.iter().all(|part| self.store.contains(&part.digest, part.bytes))
+        });
+        Ok(published.insert(Arc::new(targets)).clone())
+    }
+
+    /// Makes `targets` what is published. From here on no crash and no collection takes their contents.
+    ///
+    /// # Errors
+    /// It cannot be written; then what was published before still is.
+    pub fn publish(&self, targets: &Arc<Targets>) -> Result<(), Error> {
+        let published = Published {
+            host: crate::collect::host(),
+            folder: self.folder.to_string_lossy().into_owned(),
+            targets: (**targets).clone(),
+        };
+        self.store.put_project_document(&self.project, PUBLISHED_FILE, &published)?;
+        *lock(&self.published) = Some(targets.clone());
+        Ok(())
+    }
+
+    /// Keeps the engine's own memory for the next process.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn save_memory(&self) -> Result<(), Error> {
+        let mut memory = lock(&self.memory);
+        let (sources, outputs) = (self.sources.stamps(), self.outputs.stamps());
+        if !memory.is_changed && memory.source_stamps == sources && memory.output_stamps == outputs {
             return Ok(());
         }
-        state.targets = targets;
-        state.stamps = stamps;
-        state.dirty = false;
-        state.save(&self.store, &self.folder)
+        memory.scans.retain(|_, scan| scan.is_asked);
+        (memory.source_stamps, memory.output_stamps) = (sources, outputs);
+        self.store.put_project_document(&self.project, MEMORY_FILE, &*memory)?;
+        memory.is_changed = false;
+        Ok(())
     }
 
-    /// The key under which the action called `name` was last settled.
-    pub(crate) fn last_key(&self, name: &str) -> Option<Digest> {
-        lock(&self.state).actions.get(name).copied()
+    /// Held while the files for engines are written, so that two processes do not mix theirs.
+    pub fn lock_outputs(&self) -> Option<std::fs::File> {
+        self.store.lock_project(&self.project, OUTPUT_LOCK_FILE)
     }
 
-    pub(crate) fn remember_key(&self, name: &str, key: Digest) {
-        let mut state = lock(&self.state);
-        if state.actions.insert(name.to_owned(), key) != Some(key) {
-            state.dirty = true;
+    /// Begins a plan. `changed` names the sources that may be different since the last plan; `None` stands for all.
+    pub fn begin_plan(&self, changed: Option<&[String]>) {
+        match changed {
+            Some(paths) => self.sources.forget(paths),
+            None => self.sources.refresh(),
+        }
+        lock(&self.memory).scans.values_mut().for_each(|scan| scan.is_asked = false);
+    }
+
+    /// The builds that changed something, the newest last.
+    pub fn builds(&self) -> Vec<BuildNote> {
+        lock(&self.memory).builds.clone()
+    }
+
+    /// How the action of this name was last settled, and what was different then.
+    pub fn history(&self, action: &str) -> Option<(Arc<ActionRecord>, ChangeNote)> {
+        let memory = lock(&self.memory);
+        let action = memory.actions.get(action)?;
+        Some((action.record.clone(), action.change.clone()))
+    }
+
+    pub(crate) fn memory(&self) -> std::sync::MutexGuard<'_, Memory> {
+        lock(&self.memory)
+    }
+
+    /// Forgets actions that are in no graph any more.
+    pub(crate) fn forget_others(&self, graph: &Graph) {
+        let mut memory = lock(&self.memory);
+        if memory.actions.len() > graph.len() {
+            let names: HashSet<&str> = graph.iter().map(|(_, action)| action.name.as_str()).collect();
+            memory.actions.retain(|name, _| names.contains(name.as_str()));
+            memory.is_changed = true;
         }
     }
 
     /// Finds out what a source depends on: `look` reads through the tracker, and its result is reused as long as
     /// every file it looked at, the missing ones too, is as it was.
+    ///
+    /// # Errors
+    /// The store cannot be read or written.
     pub fn scan(
+        &self,
+        kind: &str,
+        recipe: u32,
+        root: &str,
+        look: impl FnOnce(&mut Tracker) -> (Value, Vec<Diagnostic>),
+    ) -> Result<Arc<Scan>, Error> {
+        let name = format!("{kind} {recipe} {root}");
+        let remembered = lock(&self.memory).scans.get(&name).map(|memory| memory.scan.clone());
+        if let Some(scan) = remembered
+            && self.still_holds(&scan)
+        {
+            if let Some(memory) = lock(&self.memory).scans.get_mut(&name) {
+                memory.is_asked = true;
+            }
+            return Ok(scan);
+        }
+        let scan = Arc::new(self.shared_scan(kind, recipe, root, look)?);
+        let mut memory = lock(&self.memory);
+        memory.scans.insert(name, ScanMemory { scan: scan.clone(), is_asked: true });
+        memory.is_changed = true;
+        Ok(scan)
+    }
+
+    /// A scan that some project made of the same files, or a new one.
+    fn shared_scan(
         &self,
         kind: &str,
         recipe: u32,
@@ -121,8 +242,10 @@ impl Engine {
         hasher.field("kind", kind.as_bytes());
         hasher.field("recipe", &recipe.to_le_bytes());
         hasher.field("root", root.as_bytes());
-        let path = self.store.scan_path(&hasher.finish());
-        let mut known: Vec<Scan> = self.store.read_json(&path)?.unwrap_or_default();
+        let content = self.source(root).digest().map(|digest| digest.to_string());
+        hasher.field("content", content.unwrap_or_default().as_bytes());
+        let key = hasher.finish();
+        let mut known: Vec<Scan> = self.store.scans(&key)?;
         if let Some(scan) = known.iter().find(|scan| self.still_holds(scan)) {
             return Ok(scan.clone());
         }
@@ -131,16 +254,11 @@ impl Engine {
         let scan = Scan { looked_at: tracker.looked_at, found, diagnostics };
         known.insert(0, scan.clone());
         known.truncate(SCAN_RESULTS_KEPT);
-        write_json(&path, &known)?;
+        self.store.put_scans(&key, &known)?;
         Ok(scan)
     }
 
     fn still_holds(&self, scan: &Scan) -> bool {
-        scan.looked_at.iter().all(|(path, digest)| self.sources.state(path).digest() == *digest)
-    }
-
-    /// What is at a source path, for planning.
-    pub fn source(&self, path: &str) -> SourceState {
-        self.sources.state(path)
+        scan.looked_at.iter().all(|(path, digest)| self.sources.is(path, *digest))
     }
 }

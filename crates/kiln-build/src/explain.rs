@@ -1,22 +1,92 @@
-//! Why an action ran.
+//! Why an action has another result than before.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
-use crate::ActionRecord;
+use serde::{Deserialize, Serialize};
 
-/// What differs between an action as it was last built and as it is now, in words;
-/// `None` stands for "never built under this name".
-pub fn explain(before: Option<&ActionRecord>, now: &ActionRecord) -> String {
-    let Some(before) = before else { return "first build".to_owned() };
-    let (old, new) = (deciding_fields(before), deciding_fields(now));
-    let changed = new.iter().filter(|(name, value)| old.get(*name) != Some(value));
-    let removed = old.keys().filter(|name| !new.contains_key(*name));
-    let mut reasons: Vec<String> =
-        changed.map(|(name, value)| describe(name, old.get(name).map(String::as_str), value)).collect();
-    reasons.extend(removed.map(|name| format!("{name} is gone")));
-    match reasons.len() {
-        0 => "its result is no longer in the store".to_owned(),
-        _ => reasons.join(", "),
+use crate::{ActionRecord, Digest};
+
+/// Why an action ran, or was found in the store under another key than before.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Reason {
+    /// It was never built under this name.
+    FirstBuild,
+    /// Something that decides its result is different.
+    Changed(Vec<Change>),
+    /// Everything is as it was, but what it made is no longer in the store.
+    Lost,
+}
+
+/// One thing that decides an action's result, before and after.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Change {
+    /// As `input environments/sky.hdr`, `parameter size` or `recipe version`.
+    pub field: String,
+    /// Its value before; `None` if the action did not have it.
+    pub old: Option<String>,
+    /// Its value now; `None` if the action no longer has it.
+    pub new: Option<String>,
+}
+
+/// How the value of a missing input is written.
+const MISSING: &str = "missing";
+
+impl Reason {
+    /// What differs between an action as it was last built (`None`: never) and as it is now.
+    pub fn between(before: Option<&ActionRecord>, now: &ActionRecord) -> Reason {
+        let Some(before) = before else { return Reason::FirstBuild };
+        let (old, new) = (deciding_fields(before), deciding_fields(now));
+        let of = |fields: &BTreeMap<String, String>, name: &str| fields.get(name).cloned();
+        let changed = new.keys().filter(|name| old.get(*name) != new.get(*name));
+        let gone = old.keys().filter(|name| !new.contains_key(*name));
+        let change = |name: &String| Change { field: name.clone(), old: of(&old, name), new: of(&new, name) };
+        let changes: Vec<Change> = changed.chain(gone).map(change).collect();
+        if changes.is_empty() { Reason::Lost } else { Reason::Changed(changes) }
+    }
+}
+
+impl Change {
+    /// The input it is about, if it is about one.
+    pub fn input(&self) -> Option<&str> {
+        self.field.strip_prefix("input ")
+    }
+
+    /// With both values, digests shortened: `environments/sky.hdr: 1f0c9a3e → 77b2d014`.
+    pub fn with_values(&self) -> String {
+        let short = |value: &Option<String>| match value {
+            None => "nothing".to_owned(),
+            Some(value) => value.parse::<Digest>().map_or_else(|_| value.clone(), |digest| digest.short()),
+        };
+        let what = self.input().unwrap_or(&self.field);
+        format!("{what}: {} → {}", short(&self.old), short(&self.new))
+    }
+}
+
+impl fmt::Display for Change {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.input(), self.old.as_deref(), self.new.as_deref()) {
+            (Some(input), Some(MISSING), Some(_)) => write!(f, "{input} appeared"),
+            (Some(input), Some(_), Some(MISSING)) => write!(f, "{input} disappeared"),
+            (Some(input), Some(_), Some(_)) => write!(f, "{input} changed"),
+            (Some(input), None, _) => write!(f, "{input} is new"),
+            (None, None, Some(new)) => write!(f, "{} = {new} is new", self.field),
+            (None, Some(old), Some(new)) => write!(f, "{} changed from {old} to {new}", self.field),
+            (what, _, None) => write!(f, "{} is gone", what.unwrap_or(&self.field)),
+        }
+    }
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Reason::FirstBuild => f.write_str("first build"),
+            Reason::Lost => f.write_str("its result is no longer in the store"),
+            Reason::Changed(changes) => {
+                let changes: Vec<String> = changes.iter().map(Change::to_string).collect();
+                f.write_str(&changes.join(", "))
+            }
+        }
     }
 }
 
@@ -26,15 +96,4 @@ fn deciding_fields(record: &ActionRecord) -> BTreeMap<String, String> {
         fields.insert(name.to_owned(), value.to_owned());
     });
     fields
-}
-
-fn describe(name: &str, old: Option<&str>, new: &str) -> String {
-    match (name.strip_prefix("input "), old) {
-        (Some(input), None) => format!("{input} is new"),
-        (Some(input), Some("missing")) => format!("{input} appeared"),
-        (Some(input), Some(_)) if new == "missing" => format!("{input} disappeared"),
-        (Some(input), Some(_)) => format!("{input} changed"),
-        (None, None) => format!("{name} = {new} is new"),
-        (None, Some(old)) => format!("{name} changed from {old} to {new}"),
-    }
 }

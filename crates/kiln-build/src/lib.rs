@@ -1,7 +1,8 @@
 //! A cache that people trust: content-addressed artefacts and the pure actions that make them.
 //!
-//! Start at [`Engine`]: [`Engine::scan`] finds out what a source depends on, [`Engine::run`] brings a
-//! [`Graph`] of actions up to date and says for each what happened and why. [`Store`] holds the bytes.
+//! Start at [`Engine`]: [`Engine::scan`] finds out what a source depends on, [`Engine::run`] brings a [`Graph`] of
+//! actions up to date and says for each what happened and why, [`Engine::forecast`] says what it would do.
+//! [`Store`] holds the bytes, for any number of projects and processes.
 //!
 //! Conventions: an action is a pure function of its recipe, parameters and inputs, and its key covers
 //! every byte of them; contents are named by their SHA-256; source paths are project-relative with `/`.
@@ -10,26 +11,33 @@
 //!
 //! Not here: light, shaders and scenes (`kiln-project` declares the actions), watching (`kiln-daemon`).
 
-pub use action::{Action, ActionId, ActionOutput, Graph, Input, Inputs};
+pub use action::{Action, ActionId, ActionOutput, Graph, Input, Inputs, MemoryNeed, Perform, little_memory};
+pub use collect::{CollectOptions, Collected, ProjectUsage, Usage};
 pub use digest::Digest;
 pub use engine::{Engine, Scan, Tracker};
-pub use explain::explain;
-pub use project_state::ProjectState;
-pub use record::{ActionRecord, InputRecord, OutputRecord};
+pub use explain::{Change, Reason};
+pub use fs::{Disk, FileFacts, FileSystem, write_atomically};
+pub use memory::{BuildNote, ChangeNote};
+pub use record::{ActionRecord, ActionResult, Command, InputRecord, OutputRecord};
 pub use run::{Outcome, Progress, RunOptions, RunReport, Status};
-pub use sources::{SourceState, SourceTree};
-pub use store::{Error, Store, write_atomically};
+pub use sources::{SOURCE_BYTES_MAX, SourceState, SourceTree};
+pub use store::{Error, Hold, Store};
+pub use survey::Forecast;
 pub use target::{Part, Target, TargetState, Targets};
 
 mod action;
+mod collect;
 mod digest;
+mod document;
 mod engine;
 mod explain;
-mod project_state;
+mod fs;
+mod memory;
 mod record;
 mod run;
 mod sources;
 mod store;
+mod survey;
 mod target;
 #[cfg(test)]
 mod tests;

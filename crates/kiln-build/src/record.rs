@@ -1,4 +1,16 @@
 //! What is remembered of an action: the one list of inputs feeds both its key and every explanation.
+//!
+//! The parts are those of Bazel's Remote Execution API, so that a shared remote cache can stand behind them:
+//!
+//! | here | there |
+//! |---|---|
+//! | [`Command::kind`], [`Command::recipe`], [`Command::params`] | `Command.arguments` |
+//! | [`Command::outputs`] | `Command.output_paths`: a file, or a folder of files |
+//! | [`ActionRecord::inputs`] | the input root's tree, names as paths; a missing source is an argument |
+//! | [`ActionRecord::key`] | the action's digest |
+//! | [`ActionResult::outputs`] | `ActionResult.output_files` |
+//! | [`ActionResult::meta`], [`ActionResult::diagnostics`] | `ActionResult.stdout_raw`; no outputs is `exit_code` 1 |
+//! | [`ActionResult::wall_ms`] | `ActionResult.execution_metadata` |
 
 use kiln_diagnostic::Diagnostic;
 use serde::{Deserialize, Serialize};
@@ -7,7 +19,20 @@ use crate::Digest;
 use crate::digest::FieldHasher;
 
 /// Version of the key's definition; part of every key.
-const KEY_VERSION: u32 = 1;
+const KEY_VERSION: u32 = 2;
+
+/// What is done to the inputs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Command {
+    /// What kind of step it is.
+    pub kind: String,
+    /// Version of the code that performs it.
+    pub recipe: u32,
+    /// Canonical parameters (JSON with sorted keys).
+    pub params: serde_json::Value,
+    /// What it makes: an output of this name, or any number below it (`levels` stands for `levels/mip0` …).
+    pub outputs: Vec<String>,
+}
 
 /// One thing an action read, by the name under which a person knows it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -16,12 +41,14 @@ pub struct InputRecord {
     pub name: String,
     /// Digest of its bytes; `None` when the source is missing.
     pub digest: Option<Digest>,
+    /// Its length; follows from the digest.
+    pub bytes: u64,
 }
 
 /// One thing an action made.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct OutputRecord {
-    /// As `mip3`.
+    /// As `panorama` or `levels/mip3`.
     pub name: String,
     /// Digest of its bytes.
     pub digest: Digest,
@@ -29,19 +56,9 @@ pub struct OutputRecord {
     pub bytes: u64,
 }
 
-/// An action with everything that decided its result, and the result.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ActionRecord {
-    /// As `prefilter env/sky/specular mip 3`; not part of the key.
-    pub name: String,
-    /// What kind of step it is.
-    pub kind: String,
-    /// Version of the code that performs it.
-    pub recipe: u32,
-    /// Canonical parameters (JSON with sorted keys).
-    pub params: serde_json::Value,
-    /// Everything it read.
-    pub inputs: Vec<InputRecord>,
+/// What came of an action.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ActionResult {
     /// Everything it made; empty when the input is at fault.
     pub outputs: Vec<OutputRecord>,
     /// Facts about the outputs: sizes, errors, scales.
@@ -52,20 +69,34 @@ pub struct ActionRecord {
     pub wall_ms: f64,
 }
 
+/// An action with everything that decided its result, and the result.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ActionRecord {
+    /// As `prefilter env/sky/specular mip 3`; not part of the key.
+    pub name: String,
+    /// What was done.
+    pub command: Command,
+    /// Everything it read, in the order in which the command takes it.
+    pub inputs: Vec<InputRecord>,
+    /// What came of it.
+    pub result: ActionResult,
+}
+
 impl ActionRecord {
-    /// The digest of everything that can change the result: kind, recipe, parameters, inputs.
+    /// The digest of everything that can change the result: kind, recipe, parameters, declared outputs, inputs.
     pub fn key(&self) -> Digest {
         let mut hasher = FieldHasher::default();
         self.list_deciding_fields(&mut |name, value| hasher.field(name, value.as_bytes()));
         hasher.finish()
     }
 
-    /// The one list behind [`ActionRecord::key`] and [`crate::explain`].
+    /// The one list behind [`ActionRecord::key`] and [`crate::Reason`].
     pub(crate) fn list_deciding_fields(&self, sink: &mut dyn FnMut(&str, &str)) {
+        let Command { kind, recipe, params, outputs } = &self.command;
         sink("key version", &KEY_VERSION.to_string());
-        sink("kind", &self.kind);
-        sink("recipe version", &self.recipe.to_string());
-        match &self.params {
+        sink("kind", kind);
+        sink("recipe version", &recipe.to_string());
+        match params {
             serde_json::Value::Object(params) => {
                 for (name, value) in params {
                     sink(&format!("parameter {name}"), &value.to_string());
@@ -73,6 +104,7 @@ impl ActionRecord {
             }
             other => sink("parameters", &other.to_string()),
         }
+        sink("declared outputs", &outputs.join(", "));
         for input in &self.inputs {
             let digest = input.digest.map_or_else(|| "missing".to_owned(), |digest| digest.to_string());
             sink(&format!("input {}", input.name), &digest);

@@ -2,23 +2,32 @@
 
 use std::collections::{BTreeSet, HashMap};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex};
-use std::time::Instant;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use kiln_diagnostic::Diagnostic;
 
 use crate::action::DeclaredInput;
 use crate::sources::lock;
+use crate::survey::{Declared, Standing, unperformed, upstream_of};
 use crate::{
-    Action, ActionId, ActionOutput, ActionRecord, Digest, Engine, Error, Graph, Input, InputRecord, Inputs,
-    OutputRecord, explain,
+    Action, ActionId, ActionOutput, ActionRecord, ActionResult, BuildNote, Digest, Engine, Error, Graph,
+    Input, Inputs, OutputRecord, Reason,
 };
+
+/// Contents made in a run are held for their readers up to this share of the run's memory; the others come back from the
+/// store.
+const HELD_SHARE: u64 = 4;
 
 /// How to run.
 pub struct RunOptions<'a> {
     /// Worker threads, at least 1.
     pub jobs: usize,
-    /// Set to stop after the actions in flight.
+    /// What the actions at work may take together, in bytes. One that needs more on its own runs alone.
+    pub memory_bytes: u64,
+    /// Whether to go on after an action whose input is at fault.
+    pub keep_going: bool,
+    /// Set to stop: within the actions in flight, at their next look.
     pub cancel: &'a AtomicBool,
     /// Told what happens, from worker threads.
     pub progress: &'a (dyn Fn(Progress) + Sync),
@@ -32,7 +41,7 @@ pub enum Progress<'a> {
         /// Its name.
         name: &'a str,
         /// Why it runs.
-        reason: &'a str,
+        reason: &'a Reason,
     },
     /// An action is settled, one way or another.
     Settled {
@@ -50,15 +59,15 @@ pub enum Status {
     Reused,
     /// It ran, because of `reason`.
     Ran {
-        /// In words.
-        reason: String,
+        /// Why.
+        reason: Reason,
     },
     /// An action it reads from made nothing.
     Blocked {
         /// Name of that action.
         by: String,
     },
-    /// The run was cancelled before it came to it.
+    /// The run was cancelled, or stopped at a failure, before it came to it.
     NotRun,
 }
 
@@ -68,23 +77,23 @@ pub struct Outcome {
     /// How it ended.
     pub status: Status,
     /// Everything known about it; `None` if blocked or not run.
-    pub record: Option<ActionRecord>,
+    pub record: Option<Arc<ActionRecord>>,
 }
 
 impl Outcome {
     /// Whether the action has outputs.
     pub fn succeeded(&self) -> bool {
-        self.record.as_ref().is_some_and(|record| !record.outputs.is_empty())
+        self.record.as_ref().is_some_and(|record| !record.result.outputs.is_empty())
     }
 
     /// Whether the action's own input is at fault.
     pub fn failed(&self) -> bool {
-        self.record.as_ref().is_some_and(|record| record.outputs.is_empty())
+        self.record.as_ref().is_some_and(|record| record.result.outputs.is_empty())
     }
 
     /// The output called `name`, if it was made.
     pub fn output(&self, name: &str) -> Option<&OutputRecord> {
-        self.record.as_ref()?.outputs.iter().find(|output| output.name == name)
+        self.record.as_ref()?.result.outputs.iter().find(|output| output.name == name)
     }
 }
 
@@ -93,8 +102,8 @@ impl Outcome {
 pub struct RunReport {
     /// One for each action.
     pub outcomes: Vec<Outcome>,
-    /// Names of the actions that ran, in the order in which they ended.
-    pub ended: Vec<String>,
+    /// The actions that ran, in the order in which they ended.
+    pub ended: Vec<ActionId>,
 }
 
 impl RunReport {
@@ -108,12 +117,17 @@ impl RunReport {
         !self.outcomes.iter().any(|outcome| outcome.status == Status::NotRun)
     }
 
-    /// Everything that was said, in the graph's order.
-    pub fn diagnostics(&self) -> impl Iterator<Item = &Diagnostic> {
-        self.outcomes
-            .iter()
-            .filter_map(|outcome| outcome.record.as_ref())
-            .flat_map(|record| &record.diagnostics)
+    /// How many results were in the store.
+    pub fn reused_count(&self) -> usize {
+        self.outcomes.iter().filter(|outcome| outcome.status == Status::Reused).count()
+    }
+
+    /// Everything that was said, in the graph's order, with the action that said it.
+    pub fn diagnostics(&self) -> impl Iterator<Item = (ActionId, &Diagnostic)> {
+        self.outcomes.iter().enumerate().flat_map(|(index, outcome)| {
+            let said = outcome.record.iter().flat_map(|record| &record.result.diagnostics);
+            said.map(move |diagnostic| (ActionId(index), diagnostic))
+        })
     }
 }
 
@@ -124,20 +138,49 @@ impl Engine {
     /// # Errors
     /// The first failure of the tool; failures of inputs are in the report.
     pub fn run(&self, graph: &Graph, options: &RunOptions) -> Result<RunReport, Error> {
-        let shared = Shared::new(graph);
-        std::thread::scope(|scope| {
-            for _ in 1..options.jobs.max(1) {
-                scope.spawn(|| self.work(graph, options, &shared));
-            }
-            self.work(graph, options, &shared);
-        });
-        let progress = shared.progress.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let shared = Shared::new(graph, self.survey(graph)?);
+        let waiting = lock(&shared.progress).unsettled;
+        if waiting > 0 {
+            std::thread::scope(|scope| {
+                for _ in 1..options.jobs.clamp(1, waiting) {
+                    scope.spawn(|| self.work(graph, options, &shared));
+                }
+                self.work(graph, options, &shared);
+            });
+        }
+        let progress = shared.progress.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let outcomes = progress.outcomes.into_iter().map(|outcome| outcome.unwrap_or(NOT_RUN)).collect();
+        let report = RunReport { outcomes, ended: progress.ended };
+        self.remember(graph, &report);
         match progress.error {
             Some(error) => Err(error),
-            None => Ok(RunReport {
-                outcomes: progress.outcomes.into_iter().map(|outcome| outcome.unwrap_or(NOT_RUN)).collect(),
-                ended: progress.ended,
-            }),
+            None => Ok(report),
+        }
+    }
+
+    /// Notes every outcome, so that the next build can say what is different.
+    fn remember(&self, graph: &Graph, report: &RunReport) {
+        let mut memory = self.memory();
+        let was_changed = std::mem::take(&mut memory.is_changed);
+        for outcome in &report.outcomes {
+            if let Some(record) = &outcome.record {
+                memory.settle(record, matches!(outcome.status, Status::Ran { .. }));
+            }
+        }
+        if memory.is_changed {
+            let note = BuildNote {
+                number: memory.next_build(),
+                unix_s: SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs(),
+                ran: report.ended.len(),
+                reused: report.reused_count(),
+                failed: report.outcomes.iter().filter(|outcome| outcome.failed()).count(),
+            };
+            memory.end_build(note);
+        }
+        memory.is_changed |= was_changed;
+        drop(memory);
+        if report.is_complete() {
+            self.forget_others(graph);
         }
     }
 
@@ -145,74 +188,93 @@ impl Engine {
         while let Some(id) = shared.next(options.cancel) {
             // A panic must not leave the other workers waiting for this action for ever.
             let settled = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-                self.settle(graph.action(id), &shared.declare(graph, id), options)
+                self.settle(graph, id, options, shared)
             }));
             let settled = settled.unwrap_or_else(|panic| {
                 Err(Error::Action { action: graph.action(id).name.clone(), reason: panic_text(&*panic) })
             });
-            let done = shared.settle(graph, id, settled);
+            let done = shared.settle(graph, id, settled, options);
             (options.progress)(Progress::Settled { done, total: graph.len() });
         }
     }
 
-    fn settle(&self, action: &Action, declared: &Declared, options: &RunOptions) -> Result<Settled, Error> {
-        let inputs = match declared {
-            Declared::Ready(inputs) => inputs,
-            Declared::Blocked(by) => {
-                let status = Status::Blocked { by: by.clone() };
-                return Ok(Settled { outcome: Outcome { status, record: None }, blobs: Vec::new() });
+    fn settle(
+        &self,
+        graph: &Graph,
+        id: ActionId,
+        options: &RunOptions,
+        shared: &Shared,
+    ) -> Result<Settled, Error> {
+        let action = graph.action(id);
+        let unperformed = match shared.declare(self, graph, id) {
+            Turn::Known(record) => record,
+            Turn::Settled(outcome) => return Ok(Settled { outcome, blobs: Vec::new() }),
+            Turn::Declared(record) => {
+                match self.look_up(&record)?.filter(|known| self.store().has_outputs(known)) {
+                    Some(record) => {
+                        let outcome = Outcome { status: Status::Reused, record: Some(record) };
+                        return Ok(Settled { outcome, blobs: Vec::new() });
+                    }
+                    None => record,
+                }
             }
         };
-        let mut record = unperformed(action, inputs.iter().map(|input| input.record.clone()).collect());
-        let key = record.key();
-        if let Some(mut known) = self.store().record(&key)? {
-            known.name.clone_from(&action.name);
-            self.remember_key(&action.name, key);
-            let outcome = Outcome { status: Status::Reused, record: Some(known) };
-            return Ok(Settled { outcome, blobs: Vec::new() });
+        let lengths: Vec<u64> = unperformed.inputs.iter().map(|input| input.bytes).collect();
+        let need_bytes = (action.memory)(&lengths);
+        if !shared.enter((action.rank, id.0), need_bytes, options) {
+            return Ok(Settled { outcome: NOT_RUN, blobs: Vec::new() });
         }
-        let before =
-            self.last_key(&action.name).and_then(|key| self.store().record_of_past(&key).ok().flatten());
-        let reason = explain(before.as_ref(), &record);
+        let _room = Room { shared, need_bytes };
+        let reason = self.reason(&unperformed);
         (options.progress)(Progress::Started { name: &action.name, reason: &reason });
-        let declared = inputs.iter().map(|input| input.source()).collect();
+        let declared = shared.inputs(action, &unperformed);
         let start = Instant::now();
-        let made = (action.perform)(&Inputs { engine: self, declared })?;
-        record.wall_ms = start.elapsed().as_secs_f64() * 1e3;
-        let blobs = self.keep(&mut record, made)?;
-        self.remember_key(&action.name, key);
-        Ok(Settled { outcome: Outcome { status: Status::Ran { reason }, record: Some(record) }, blobs })
+        let made = (action.perform)(&Inputs { engine: self, declared, cancel: options.cancel })?;
+        let wall_ms = start.elapsed().as_secs_f64() * 1e3;
+        let (record, blobs) = self.keep(unperformed, made, wall_ms)?;
+        Ok(Settled {
+            outcome: Outcome { status: Status::Ran { reason }, record: Some(Arc::new(record)) },
+            blobs,
+        })
     }
 
-    fn keep(&self, record: &mut ActionRecord, made: ActionOutput) -> Result<Vec<Arc<[u8]>>, Error> {
-        let mut blobs = Vec::with_capacity(made.outputs.len());
+    fn keep(
+        &self,
+        mut record: ActionRecord,
+        made: ActionOutput,
+        wall_ms: f64,
+    ) -> Result<(ActionRecord, Vec<Arc<[u8]>>), Error> {
+        check_declared(&record, &made)?;
+        let mut outputs = Vec::with_capacity(made.outputs.len());
+        let mut blobs: Vec<Arc<[u8]>> = Vec::with_capacity(made.outputs.len());
         for (name, bytes) in made.outputs {
-            let digest = self.store().put(&bytes)?;
-            record.outputs.push(OutputRecord { name, digest, bytes: bytes.len() as u64 });
+            outputs.push(OutputRecord { name, digest: Digest::of(&bytes), bytes: bytes.len() as u64 });
             blobs.push(bytes.into());
         }
-        record.meta = made.meta;
-        record.diagnostics = made.diagnostics;
-        self.store().put_record(record)?;
-        Ok(blobs)
+        record.result = ActionResult { outputs, meta: made.meta, diagnostics: made.diagnostics, wall_ms };
+        self.store().put_result(&record, &blobs)?;
+        Ok((record, blobs))
     }
+}
+
+/// An action that made something made all that it declares and nothing else: a result with a gap must never be kept.
+fn check_declared(record: &ActionRecord, made: &ActionOutput) -> Result<(), Error> {
+    let is_of = |name: &str, declared: &str| {
+        name.strip_prefix(declared).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+    };
+    let declared = &record.command.outputs;
+    let names = || made.outputs.iter().map(|(name, _)| name);
+    let missing = declared.iter().find(|declared| !names().any(|name| is_of(name, declared)));
+    let undeclared = names().find(|name| !declared.iter().any(|declared| is_of(name, declared)));
+    let reason = match (undeclared, missing) {
+        (Some(name), _) => format!("it made `{name}`, which it does not declare"),
+        (None, Some(declared)) if !made.outputs.is_empty() => format!("it did not make `{declared}`"),
+        (None, _) => return Ok(()),
+    };
+    Err(Error::Action { action: record.name.clone(), reason })
 }
 
 const NOT_RUN: Outcome = Outcome { status: Status::NotRun, record: None };
-
-fn unperformed(action: &Action, inputs: Vec<InputRecord>) -> ActionRecord {
-    ActionRecord {
-        name: action.name.clone(),
-        kind: action.kind.to_owned(),
-        recipe: action.recipe,
-        params: action.params.clone(),
-        inputs,
-        outputs: Vec::new(),
-        meta: serde_json::Value::Null,
-        diagnostics: Vec::new(),
-        wall_ms: 0.0,
-    }
-}
 
 fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
     let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
@@ -235,63 +297,86 @@ struct Shared {
 struct RunProgress {
     /// (rank, index) of the actions whose inputs are settled.
     ready: BTreeSet<(u32, usize)>,
+    /// Actions that the survey found due.
+    due: HashMap<usize, ActionRecord>,
     /// Number of distinct unsettled actions each waits for.
     waiting_for: Vec<usize>,
     readers: Vec<Vec<usize>>,
     /// Number of distinct actions that have still to read each one's outputs.
     unread_by: Vec<usize>,
-    ranks: Vec<u32>,
     outcomes: Vec<Option<Outcome>>,
+    unsettled: usize,
     in_flight: usize,
-    done: usize,
-    ended: Vec<String>,
+    ended: Vec<ActionId>,
     /// Contents made in this run, so that readers need not go back to the disk.
     held: HashMap<Digest, Arc<[u8]>>,
+    held_bytes: u64,
+    /// What the actions at work need together.
+    working_bytes: u64,
+    /// (rank, index) of the actions that wait for room; the first of them is the next to get it.
+    waiting_for_room: BTreeSet<(u32, usize)>,
+    is_stopped: bool,
     error: Option<Error>,
 }
 
-enum Declared {
-    Ready(Vec<ReadyInput>),
-    Blocked(String),
+/// What is known of an action whose turn it is.
+enum Turn {
+    /// The survey has found no result for it.
+    Known(ActionRecord),
+    /// Its inputs have become known.
+    Declared(ActionRecord),
+    Settled(Outcome),
 }
 
-struct ReadyInput {
-    record: InputRecord,
-    /// For outputs of this run: the bytes, still in memory.
-    held: Option<Arc<[u8]>>,
-    is_source: bool,
+/// Memory set aside for an action at work.
+struct Room<'a> {
+    shared: &'a Shared,
+    need_bytes: u64,
 }
 
-impl ReadyInput {
-    fn source(&self) -> DeclaredInput {
-        match (self.is_source, self.record.digest) {
-            (false, Some(digest)) => DeclaredInput::Blob { digest, held: self.held.clone() },
-            (_, digest) => DeclaredInput::Source { path: self.record.name.clone(), digest },
-        }
+impl Drop for Room<'_> {
+    fn drop(&mut self) {
+        lock(&self.shared.progress).working_bytes -= self.need_bytes;
+        self.shared.changed.notify_all();
     }
 }
 
 impl Shared {
-    fn new(graph: &Graph) -> Shared {
+    fn new(graph: &Graph, standings: Vec<Standing>) -> Shared {
         let count = graph.len();
         let mut progress = RunProgress {
             readers: vec![Vec::new(); count],
-            ranks: graph.actions.iter().map(|action| action.rank).collect(),
-            outcomes: vec![None; count],
-            ..RunProgress::default()
+            waiting_for: vec![0; count],
+            ..Default::default()
         };
-        for (index, action) in graph.actions.iter().enumerate() {
-            let upstream: BTreeSet<usize> = action.inputs.iter().filter_map(upstream).collect();
-            progress.waiting_for.push(upstream.len());
-            if upstream.is_empty() {
-                progress.ready.insert((action.rank, index));
+        for (index, standing) in standings.into_iter().enumerate() {
+            let action = &graph.actions[index];
+            let outcome = match standing {
+                Standing::Settled(outcome) => Some(outcome),
+                Standing::Due(record) => {
+                    progress.due.insert(index, record);
+                    None
+                }
+                Standing::Waiting(_) => None,
+            };
+            if outcome.is_none() {
+                progress.unsettled += 1;
+                let upstream = distinct_upstream(action);
+                progress.waiting_for[index] =
+                    upstream.iter().filter(|&&upstream| progress.outcomes[upstream].is_none()).count();
+                if progress.waiting_for[index] == 0 {
+                    progress.ready.insert((action.rank, index));
+                }
+                upstream.into_iter().for_each(|upstream| progress.readers[upstream].push(index));
             }
-            for action in upstream {
-                progress.readers[action].push(index);
-            }
+            progress.outcomes.push(outcome);
         }
         progress.unread_by = progress.readers.iter().map(Vec::len).collect();
         Shared { progress: Mutex::new(progress), changed: Condvar::new() }
+    }
+
+    fn wait<'a>(&self, progress: MutexGuard<'a, RunProgress>) -> MutexGuard<'a, RunProgress> {
+        self.changed.wait(progress).unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The next action to settle; waits while others may still make one ready.
@@ -309,84 +394,139 @@ impl Shared {
             if progress.in_flight == 0 {
                 return None;
             }
-            progress = self.changed.wait(progress).unwrap_or_else(std::sync::PoisonError::into_inner);
+            progress = self.wait(progress);
         }
     }
 
-    fn declare(&self, graph: &Graph, id: ActionId) -> Declared {
-        let progress = lock(&self.progress);
-        let mut inputs = Vec::new();
-        for input in &graph.action(id).inputs {
-            let (record, is_source) = match input {
-                Input::Source { path, digest } => (InputRecord { name: path.clone(), digest: *digest }, true),
-                Input::Output { action, output } => {
-                    let name = &graph.action(*action).name;
-                    let made =
-                        progress.outcomes[action.0].as_ref().and_then(|outcome| outcome.output(output));
-                    let Some(made) = made else { return Declared::Blocked(name.clone()) };
-                    (InputRecord { name: format!("{name}/{output}"), digest: Some(made.digest) }, false)
-                }
-            };
-            let held = record.digest.and_then(|digest| progress.held.get(&digest).cloned());
-            inputs.push(ReadyInput { record, held, is_source });
+    fn declare(&self, engine: &Engine, graph: &Graph, id: ActionId) -> Turn {
+        let mut progress = lock(&self.progress);
+        if let Some(record) = progress.due.remove(&id.0) {
+            return Turn::Known(record);
         }
-        Declared::Ready(inputs)
+        let action = graph.action(id);
+        match engine.declare(graph, action, |upstream| progress.outcomes[upstream.0].as_ref()) {
+            Declared::Ready(inputs) => Turn::Declared(unperformed(action, inputs)),
+            Declared::Waiting(_) => Turn::Settled(NOT_RUN),
+            Declared::Blocked(by) => {
+                let is_not_run = |upstream: usize| {
+                    progress.outcomes[upstream]
+                        .as_ref()
+                        .is_some_and(|outcome| outcome.status == Status::NotRun)
+                };
+                let is_not_run = distinct_upstream(action).into_iter().any(is_not_run);
+                let status = if is_not_run { Status::NotRun } else { Status::Blocked { by } };
+                Turn::Settled(Outcome { status, record: None })
+            }
+        }
+    }
+
+    /// Waits for room; false if the run ends instead.
+    fn enter(&self, place: (u32, usize), need_bytes: u64, options: &RunOptions) -> bool {
+        let mut progress = lock(&self.progress);
+        progress.waiting_for_room.insert(place);
+        let may_enter = loop {
+            if progress.is_stopped || progress.error.is_some() || options.cancel.load(Ordering::Relaxed) {
+                break false;
+            }
+            let taken = progress.working_bytes.saturating_add(progress.held_bytes);
+            let fits = taken.saturating_add(need_bytes) <= options.memory_bytes;
+            let is_alone = progress.working_bytes == 0;
+            if progress.waiting_for_room.first() == Some(&place) && (fits || is_alone) {
+                break true;
+            }
+            progress = self.wait(progress);
+        };
+        progress.waiting_for_room.remove(&place);
+        if may_enter {
+            progress.working_bytes += need_bytes;
+        }
+        self.changed.notify_all();
+        may_enter
+    }
+
+    fn inputs(&self, action: &Action, record: &ActionRecord) -> Vec<DeclaredInput> {
+        let progress = lock(&self.progress);
+        let declared = action.inputs.iter().zip(&record.inputs);
+        let declared = declared.map(|(input, record)| match (input, record.digest) {
+            (Input::Output { .. }, Some(digest)) => {
+                DeclaredInput::Blob { digest, held: progress.held.get(&digest).cloned() }
+            }
+            (_, digest) => DeclaredInput::Source { path: record.name.clone(), digest },
+        });
+        declared.collect()
     }
 
     /// Notes a result and makes its readers ready; returns how many actions are settled.
-    fn settle(&self, graph: &Graph, id: ActionId, settled: Result<Settled, Error>) -> usize {
-        let mut progress = lock(&self.progress);
-        let progress = &mut *progress;
+    fn settle(
+        &self,
+        graph: &Graph,
+        id: ActionId,
+        settled: Result<Settled, Error>,
+        options: &RunOptions,
+    ) -> usize {
+        let mut guard = lock(&self.progress);
+        let progress = &mut *guard;
         progress.in_flight -= 1;
-        progress.done += 1;
+        progress.unsettled -= 1;
         match settled {
+            Err(Error::Cancelled) => {}
             Err(error) => {
                 progress.error.get_or_insert(error);
             }
             Ok(settled) => {
                 if matches!(settled.outcome.status, Status::Ran { .. }) {
-                    progress.ended.push(graph.action(id).name.clone());
+                    progress.ended.push(id);
                 }
-                if let Some(record) = &settled.outcome.record
-                    && progress.unread_by[id.0] > 0
-                {
-                    let digests = record.outputs.iter().map(|output| output.digest);
-                    progress.held.extend(digests.zip(settled.blobs));
-                }
+                progress.is_stopped |= !options.keep_going && settled.outcome.failed();
+                progress.hold(id, &settled, options.memory_bytes / HELD_SHARE);
                 progress.outcomes[id.0] = Some(settled.outcome);
                 progress.release_inputs(graph.action(id));
                 for reader in std::mem::take(&mut progress.readers[id.0]) {
                     progress.waiting_for[reader] -= 1;
                     if progress.waiting_for[reader] == 0 {
-                        progress.ready.insert((progress.ranks[reader], reader));
+                        progress.ready.insert((graph.actions[reader].rank, reader));
                     }
                 }
             }
         }
         self.changed.notify_all();
-        progress.done
+        graph.len() - progress.unsettled
     }
 }
 
 impl RunProgress {
+    /// Keeps contents at hand for those that will read them.
+    fn hold(&mut self, id: ActionId, settled: &Settled, held_bytes_max: u64) {
+        let Some(record) = settled.outcome.record.as_ref().filter(|_| self.unread_by[id.0] > 0) else {
+            return;
+        };
+        for (output, bytes) in record.result.outputs.iter().zip(&settled.blobs) {
+            let fits = self.held_bytes + output.bytes <= held_bytes_max;
+            if fits && self.held.insert(output.digest, bytes.clone()).is_none() {
+                self.held_bytes += output.bytes;
+            }
+        }
+    }
+
     /// Forgets contents that nobody has still to read: a large environment must not fill the memory until the end.
     fn release_inputs(&mut self, action: &Action) {
-        let upstream: BTreeSet<usize> = action.inputs.iter().filter_map(upstream).collect();
-        for index in upstream {
-            self.unread_by[index] -= 1;
-            if self.unread_by[index] == 0
-                && let Some(record) =
-                    self.outcomes[index].as_ref().and_then(|outcome| outcome.record.as_ref())
-            {
-                record.outputs.iter().for_each(|output| _ = self.held.remove(&output.digest));
+        for index in distinct_upstream(action) {
+            // Actions that the survey settled have no readers to count, and hold nothing.
+            self.unread_by[index] = self.unread_by[index].saturating_sub(1);
+            if self.unread_by[index] > 0 {
+                continue;
+            }
+            let record = self.outcomes[index].as_ref().and_then(|outcome| outcome.record.clone());
+            for output in record.iter().flat_map(|record| &record.result.outputs) {
+                if self.held.remove(&output.digest).is_some() {
+                    self.held_bytes -= output.bytes;
+                }
             }
         }
     }
 }
 
-fn upstream(input: &Input) -> Option<usize> {
-    match input {
-        Input::Output { action, .. } => Some(action.0),
-        Input::Source { .. } => None,
-    }
+/// The distinct actions that an action reads from.
+fn distinct_upstream(action: &Action) -> BTreeSet<usize> {
+    upstream_of(action).map(|id| id.0).collect()
 }

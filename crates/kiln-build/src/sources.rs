@@ -1,9 +1,10 @@
 //! The files a person edits, seen through stamps so that unchanged ones are not read again.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fs;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
@@ -44,8 +45,8 @@ impl SourceState {
 pub(crate) struct Stamp {
     inode: u64,
     bytes: u64,
-    modified_ns: u128,
-    changed_ns: i128,
+    modified_ns: u64,
+    changed_ns: i64,
     digest: Digest,
     /// False while the file is too young for its stamp to prove anything.
     settled: bool,
@@ -56,13 +57,28 @@ pub(crate) struct Stamp {
 pub struct SourceTree {
     root: PathBuf,
     stamps: Mutex<BTreeMap<String, Stamp>>,
-    seen: Mutex<BTreeMap<String, SourceState>>,
+    seen: Mutex<HashMap<String, Seen>>,
+    hashed_files: AtomicUsize,
+    hashed_bytes: AtomicU64,
+}
+
+/// What was found at a path.
+#[derive(Clone, Debug, PartialEq)]
+struct Seen {
+    state: SourceState,
+    bytes: u64,
 }
 
 impl SourceTree {
     /// The tree below `root`, knowing the stamps of an earlier run.
     pub(crate) fn new(root: PathBuf, stamps: BTreeMap<String, Stamp>) -> SourceTree {
-        SourceTree { root, stamps: Mutex::new(stamps), seen: Mutex::default() }
+        SourceTree {
+            root,
+            stamps: Mutex::new(stamps),
+            seen: Mutex::default(),
+            hashed_files: AtomicUsize::new(0),
+            hashed_bytes: AtomicU64::new(0),
+        }
     }
 
     /// The project's folder.
@@ -75,72 +91,126 @@ impl SourceTree {
         lock(&self.seen).clear();
     }
 
+    /// Forgets what was seen at some paths: whoever is told of every change need not look at the other files again.
+    pub fn forget<'a>(&self, paths: impl IntoIterator<Item = &'a String>) {
+        let mut seen = lock(&self.seen);
+        for path in paths {
+            seen.remove(path);
+        }
+    }
+
     /// What is at `path` (project-relative) now, or was when it was first looked at since the last refresh.
     pub fn state(&self, path: &str) -> SourceState {
-        if let Some(state) = lock(&self.seen).get(path) {
-            return state.clone();
+        self.look(path).state
+    }
+
+    /// Length of the file at `path` as it was seen; 0 if there is none.
+    pub(crate) fn bytes(&self, path: &str) -> u64 {
+        self.look(path).bytes
+    }
+
+    /// Whether the content at `path` is still, or again, the one with this digest.
+    pub(crate) fn is(&self, path: &str, digest: Option<Digest>) -> bool {
+        if let Some(seen) = lock(&self.seen).get(path) {
+            return seen.state.digest() == digest;
         }
-        let state = self.examine(path);
-        lock(&self.seen).insert(path.to_owned(), state.clone());
-        state
+        self.state(path).digest() == digest
+    }
+
+    fn look(&self, path: &str) -> Seen {
+        if let Some(seen) = lock(&self.seen).get(path) {
+            return seen.clone();
+        }
+        let seen = self.examine(path);
+        lock(&self.seen).insert(path.to_owned(), seen.clone());
+        seen
     }
 
     /// The bytes at `path`; `None` if there is no readable file.
     pub fn read(&self, path: &str) -> Option<Arc<[u8]>> {
-        let bytes = match read_file(&self.root.join(path)) {
-            Ok(bytes) => bytes,
-            Err(_) => {
-                // Seen as missing or unreadable, so that its appearance counts as a change.
-                self.state(path);
-                return None;
-            }
+        let Ok(bytes) = read_file(&self.root.join(path)) else {
+            // Seen as missing or unreadable, so that its appearance counts as a change.
+            self.state(path);
+            return None;
         };
-        lock(&self.seen).entry(path.to_owned()).or_insert_with(|| SourceState::Present(Digest::of(&bytes)));
+        if !lock(&self.seen).contains_key(path) {
+            let state = SourceState::Present(self.hash(&bytes));
+            lock(&self.seen).insert(path.to_owned(), Seen { state, bytes: bytes.len() as u64 });
+        }
         Some(bytes.into())
     }
 
     /// Every path looked at since the last refresh, missing ones too: what a watcher must watch.
     pub fn looked_at(&self) -> Vec<String> {
-        lock(&self.seen).keys().cloned().collect()
+        let mut paths: Vec<String> = lock(&self.seen).keys().cloned().collect();
+        paths.sort_unstable();
+        paths
     }
 
-    /// Paths that are no longer as they were when they were looked at.
-    pub fn changed_since_seen(&self) -> Vec<String> {
-        let seen = lock(&self.seen).clone();
-        seen.into_iter().filter(|(path, state)| self.examine(path) != *state).map(|(path, _)| path).collect()
+    /// Those of `paths` that are no longer as they were when they were looked at.
+    pub fn changed_since_seen<'a>(&self, paths: impl IntoIterator<Item = &'a String>) -> Vec<String> {
+        let seen = |path: &String| lock(&self.seen).get(path).cloned();
+        let is_changed = |path: &&String| seen(path).is_some_and(|seen| self.examine(path) != seen);
+        paths.into_iter().filter(is_changed).cloned().collect()
     }
 
+    /// How many files were read to learn their digest, and how many bytes they had together.
+    pub fn hashed(&self) -> (usize, u64) {
+        (self.hashed_files.load(Ordering::Relaxed), self.hashed_bytes.load(Ordering::Relaxed))
+    }
+
+    fn hash(&self, bytes: &[u8]) -> Digest {
+        self.count_hashed(bytes.len() as u64);
+        Digest::of(bytes)
+    }
+
+    fn count_hashed(&self, bytes: u64) {
+        self.hashed_files.fetch_add(1, Ordering::Relaxed);
+        self.hashed_bytes.fetch_add(bytes, Ordering::Relaxed);
+    }
+
+    /// The stamps of the files that were looked at since the last refresh.
     pub(crate) fn stamps(&self) -> BTreeMap<String, Stamp> {
-        lock(&self.stamps).clone()
+        let seen = lock(&self.seen);
+        lock(&self.stamps)
+            .iter()
+            .filter(|(path, _)| seen.contains_key(*path))
+            .map(|(path, stamp)| (path.clone(), stamp.clone()))
+            .collect()
     }
 
-    fn examine(&self, path: &str) -> SourceState {
+    fn examine(&self, path: &str) -> Seen {
         let full = self.root.join(path);
+        let without_content = |state| Seen { state, bytes: 0 };
         let metadata = match fs::metadata(&full) {
             Ok(metadata) => metadata,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return SourceState::Missing,
-            Err(error) => return SourceState::Unreadable(error.to_string()),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                return without_content(SourceState::Missing);
+            }
+            Err(error) => return without_content(SourceState::Unreadable(error.to_string())),
         };
         if !metadata.is_file() {
-            return SourceState::Unreadable("it is not a file".to_owned());
+            return without_content(SourceState::Unreadable("it is not a file".to_owned()));
         }
         if metadata.len() > SOURCE_BYTES_MAX {
-            return SourceState::Unreadable(format!("it is larger than {} GiB", SOURCE_BYTES_MAX >> 30));
+            let reason = format!("it is larger than {} GiB", SOURCE_BYTES_MAX >> 30);
+            return without_content(SourceState::Unreadable(reason));
         }
+        let bytes = metadata.len();
         if let Some(stamp) = lock(&self.stamps).get(path)
             && stamp.settled
             && *stamp == Stamp::new(&metadata, stamp.digest, true)
         {
-            return SourceState::Present(stamp.digest);
+            return Seen { state: SourceState::Present(stamp.digest), bytes };
         }
-        match read_file(&full) {
-            Ok(bytes) => {
-                let digest = Digest::of(&bytes);
-                let stamp = Stamp::new(&metadata, digest, is_settled(&metadata));
+        self.count_hashed(bytes);
+        match fs::File::open(&full).and_then(|file| Digest::of_reader(&mut file.take(SOURCE_BYTES_MAX))) {
+            Ok(digest) => {
+                let stamp = Stamp::new(&metadata, digest, is_settled(&metadata, SystemTime::now()));
                 lock(&self.stamps).insert(path.to_owned(), stamp);
-                SourceState::Present(digest)
+                Seen { state: SourceState::Present(digest), bytes }
             }
-            Err(error) => SourceState::Unreadable(error.to_string()),
+            Err(error) => without_content(SourceState::Unreadable(error.to_string())),
         }
     }
 }
@@ -159,28 +229,34 @@ fn read_file(path: &Path) -> std::io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-fn is_settled(metadata: &fs::Metadata) -> bool {
-    let modified = metadata.modified().unwrap_or_else(|_| SystemTime::now());
-    SystemTime::now().duration_since(modified).is_ok_and(|age| age > RACY)
+/// Whether a file that is hashed at `now` is old enough for its stamp to prove its content from then on. Both its times
+/// count: the one can be set by anybody, and the other is the system's. A clock that went back makes files of the future,
+/// which never settle and are hashed each time.
+fn is_settled(metadata: &fs::Metadata, now: SystemTime) -> bool {
+    let Ok(modified) = metadata.modified() else { return false };
+    let changed = UNIX_EPOCH.checked_add(Duration::from_nanos(identity(metadata).1.try_into().unwrap_or(0)));
+    let latest = changed.map_or(modified, |changed| changed.max(modified));
+    now.duration_since(latest).is_ok_and(|age| age > RACY)
 }
 
 impl Stamp {
     fn new(metadata: &fs::Metadata, digest: Digest, settled: bool) -> Stamp {
         let modified = metadata.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok());
         let (inode, changed_ns) = identity(metadata);
-        let modified_ns = modified.unwrap_or_default().as_nanos();
+        let modified_ns = modified.and_then(|time| time.as_nanos().try_into().ok()).unwrap_or_default();
         Stamp { inode, bytes: metadata.len(), modified_ns, changed_ns, digest, settled }
     }
 }
 
+/// Inode and time of the last change to content or attributes, which no program can set.
 #[cfg(unix)]
-fn identity(metadata: &fs::Metadata) -> (u64, i128) {
+fn identity(metadata: &fs::Metadata) -> (u64, i64) {
     use std::os::unix::fs::MetadataExt as _;
-    (metadata.ino(), i128::from(metadata.ctime()) * 1_000_000_000 + i128::from(metadata.ctime_nsec()))
+    (metadata.ino(), metadata.ctime().saturating_mul(1_000_000_000).saturating_add(metadata.ctime_nsec()))
 }
 
 #[cfg(not(unix))]
-fn identity(_: &fs::Metadata) -> (u64, i128) {
+fn identity(_: &fs::Metadata) -> (u64, i64) {
     (0, 0)
 }
 
@@ -191,11 +267,8 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 
 /// Reads a whole file of the tree or says why not.
 pub(crate) fn read_declared(tree: &SourceTree, path: &str, digest: Digest) -> Result<Arc<[u8]>, Error> {
-    let full = tree.root.join(path);
-    let bytes = read_file(&full).map_err(Error::io("read", &full))?;
-    if Digest::of(&bytes) == digest {
-        return Ok(bytes.into());
+    match read_file(&tree.root.join(path)) {
+        Ok(bytes) if Digest::of(&bytes) == digest => Ok(bytes.into()),
+        Ok(_) | Err(_) => Err(Error::SourceChanged { path: path.to_owned() }),
     }
-    let changed = std::io::Error::other("it changed while the build ran; build again");
-    Err(Error::Io { operation: "use", path: full, source: changed })
 }

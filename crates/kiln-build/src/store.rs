@@ -1,26 +1,42 @@
-//! Content-addressed bytes and action records, as plain files.
+//! Content-addressed bytes and action records, as plain files that any number of processes share.
 //!
 //! ```text
-//! ROOT/v1/cas/ab/abcd…          the bytes whose SHA-256 is abcd…
-//! ROOT/v1/actions/ab/abcd….json the record of the action with that key
-//! ROOT/v1/scans/ab/abcd….json   what a scan found, with the states of the files it looked at
-//! ROOT/v1/projects/abcd….json   per project: source stamps, last good targets
+//! ROOT/v2/cas/ab/abcd…                 the bytes whose SHA-256 is abcd…
+//! ROOT/v2/actions/ab/abcd….json        the record of the action with that key
+//! ROOT/v2/scans/ab/abcd….json          what a scan found, with the states of the files it looked at
+//! ROOT/v2/projects/abcd…/….json        per project: published targets, memory
+//! ROOT/v2/lock                         held shared by whoever builds, exclusively by a collection
 //! ```
 //!
-//! Every file is written whole under a temporary name, synced and renamed, so that a killed process leaves
-//! either the old file or the new one. Everything is checked when read: a blob against its name, a record
-//! by parsing it; what fails the check is dropped and counts as absent.
+//! Every file is written whole ([`crate::write_atomically`]), so a killed process leaves either the old file or the new
+//! one. Everything is checked when read: a blob against its name, a document against the digest it begins with. What
+//! fails the check is dropped and counts as absent. A cache that cannot be written is read, and what it lacks goes to a
+//! temporary folder.
 
-use std::fs;
-use std::io::Write as _;
+use std::fs::{File, OpenOptions};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::time::{Duration, SystemTime};
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::{ActionRecord, Digest};
+use crate::fs::{FileFacts, temporary_name, write_all_atomically};
+use crate::{ActionRecord, Digest, Disk, FileSystem, document};
+
+/// Folder of the present format below a cache's root. Others are of other versions and nobody's business but the
+/// collection's.
+pub(crate) const FORMAT_FOLDER: &str = "v2";
+pub(crate) const BLOBS: &str = "cas";
+pub(crate) const RECORDS: &str = "actions";
+pub(crate) const SCANS: &str = "scans";
+pub(crate) const PROJECTS: &str = "projects";
+const LOCK_FILE: &str = "lock";
+
+/// A file is marked as used if its mark is older than this: fine enough to tell old from new, rare enough to cost nothing.
+const USE_MARK_AGE: Duration = Duration::from_secs(3600);
 
 /// The tool could not do its work; the input is not to blame.
 #[derive(Debug, thiserror::Error)]
@@ -33,7 +49,7 @@ pub enum Error {
         /// The file.
         path: PathBuf,
         /// The system's reason.
-        source: std::io::Error,
+        source: io::Error,
     },
     /// An action failed for a reason that is not its input.
     #[error("action `{action}` failed: {reason}")]
@@ -43,10 +59,25 @@ pub enum Error {
         /// What happened.
         reason: String,
     },
+    /// Contents that the store had are damaged or gone: building again makes them anew.
+    #[error("the store no longer has {what}; build again")]
+    Lost {
+        /// What they are.
+        what: String,
+    },
+    /// A source is no longer what it was when the graph was planned: planning again sees it as it is.
+    #[error("{path} changed while the build ran; build again")]
+    SourceChanged {
+        /// Relative to the project.
+        path: String,
+    },
+    /// The result is not wanted any more.
+    #[error("cancelled")]
+    Cancelled,
 }
 
 impl Error {
-    pub(crate) fn io(operation: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Error {
+    pub(crate) fn io(operation: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Error {
         let path = path.to_owned();
         move |source| Error::Io { operation, path, source }
     }
@@ -55,63 +86,160 @@ impl Error {
 /// Artefacts by digest, and the record of which action made what.
 #[derive(Debug)]
 pub struct Store {
+    fs: Arc<dyn FileSystem>,
     root: PathBuf,
+    /// Where new files go if the root cannot be written.
+    scratch: Option<tempfile::TempDir>,
     damaged: AtomicUsize,
+    written_bytes: AtomicU64,
+}
+
+/// While it lives no collection takes anything out of the store.
+#[derive(Debug)]
+pub struct Hold {
+    /// Locked until it is closed; `None` where the file system has no locks.
+    _lock: Option<File>,
 }
 
 impl Store {
-    /// Opens or creates the store below `root`.
-    pub fn open(root: &Path) -> Result<Store, Error> {
-        let root = root.join("v1");
-        for folder in ["cas", "actions", "scans", "projects"] {
-            let folder = root.join(folder);
-            fs::create_dir_all(&folder).map_err(Error::io("create the folder", &folder))?;
-        }
-        Ok(Store { root, damaged: AtomicUsize::new(0) })
+    /// Opens or creates the store below `cache`.
+    ///
+    /// # Errors
+    /// The folder can neither be made nor read.
+    pub fn open(cache: &Path) -> Result<Store, Error> {
+        Store::open_on(Arc::new(Disk), cache)
+    }
+
+    /// The same on another file system.
+    ///
+    /// # Errors
+    /// The folder can neither be made nor read.
+    pub fn open_on(fs: Arc<dyn FileSystem>, cache: &Path) -> Result<Store, Error> {
+        let root = cache.join(FORMAT_FOLDER);
+        let scratch = match prepare(&*fs, &root) {
+            Ok(()) => None,
+            Err(error) if is_read_only(&error) && root.join(BLOBS).is_dir() => {
+                let scratch = tempfile::tempdir().map_err(Error::io("create a folder for", &root))?;
+                prepare(&*fs, scratch.path()).map_err(Error::io("create the folder", scratch.path()))?;
+                Some(scratch)
+            }
+            Err(error) => return Err(Error::io("create the folder", &root)(error)),
+        };
+        Ok(Store { fs, root, scratch, damaged: AtomicUsize::new(0), written_bytes: AtomicU64::new(0) })
+    }
+
+    /// The folder of this format's files.
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// The file operations it works with.
+    pub fn file_system(&self) -> &dyn FileSystem {
+        &*self.fs
+    }
+
+    /// Whether the cache cannot be written, so that what this process makes ends with it.
+    pub fn is_read_only(&self) -> bool {
+        self.scratch.is_some()
+    }
+
+    /// Keeps collections away; waits for one that runs.
+    pub fn hold(&self) -> Hold {
+        let lock = self.lock_file().ok().filter(|file| file.lock_shared().is_ok());
+        Hold { _lock: lock }
+    }
+
+    /// Whether the file system can keep a collection away from builds.
+    pub fn has_locks(&self) -> bool {
+        self.lock_file().is_ok_and(|file| match file.try_lock_shared() {
+            Ok(()) | Err(std::fs::TryLockError::WouldBlock) => true,
+            Err(std::fs::TryLockError::Error(_)) => false,
+        })
+    }
+
+    pub(crate) fn lock_file(&self) -> io::Result<File> {
+        let path = self.root.join(LOCK_FILE);
+        // A lock can be taken on a file of somebody else's, too.
+        OpenOptions::new().write(true).create(true).truncate(false).open(&path).or_else(|_| File::open(&path))
     }
 
     /// Keeps `bytes` and returns their name.
+    ///
+    /// # Errors
+    /// They cannot be written.
     pub fn put(&self, bytes: &[u8]) -> Result<Digest, Error> {
         let digest = Digest::of(bytes);
-        let path = self.path("cas", &digest, "");
-        let present = fs::metadata(&path).is_ok_and(|metadata| metadata.len() == bytes.len() as u64);
-        if !present {
-            write_atomically(&path, bytes)?;
-        }
+        self.write_missing(&[(digest, bytes)], None)?;
         Ok(digest)
     }
 
-    /// The bytes named `digest`, or `None` if they are absent; damaged ones are removed and count as absent.
-    pub fn get(&self, digest: &Digest) -> Result<Option<Arc<[u8]>>, Error> {
-        let path = self.path("cas", digest, "");
-        let Some(bytes) = read_if_present(&path)? else { return Ok(None) };
-        if Digest::of(&bytes) == *digest {
-            return Ok(Some(bytes.into()));
+    /// Keeps what an action made and then its record.
+    ///
+    /// # Errors
+    /// They cannot be written.
+    pub fn put_result(&self, record: &ActionRecord, blobs: &[Arc<[u8]>]) -> Result<(), Error> {
+        let digests = record.result.outputs.iter().map(|output| output.digest);
+        let blobs: Vec<(Digest, &[u8])> = digests.zip(blobs.iter().map(|bytes| &**bytes)).collect();
+        self.write_missing(&blobs, Some(record))
+    }
+
+    fn write_missing(&self, blobs: &[(Digest, &[u8])], record: Option<&ActionRecord>) -> Result<(), Error> {
+        let mut files: Vec<(PathBuf, &[u8])> = Vec::new();
+        for (digest, bytes) in blobs {
+            let path = self.new_path(BLOBS, digest, "");
+            if !self.contains(digest, bytes.len() as u64) && !files.iter().any(|(known, _)| *known == path) {
+                files.push((path, bytes));
+            }
         }
-        self.drop_damaged(&path);
+        let document;
+        if let Some(record) = record {
+            let path = self.new_path(RECORDS, &record.key(), ".json");
+            document = document::encode(&path, record)?;
+            files.push((path, &document));
+        }
+        let bytes: usize = files.iter().map(|(_, bytes)| bytes.len()).sum();
+        self.written_bytes.fetch_add(bytes as u64, Ordering::Relaxed);
+        write_all_atomically(&*self.fs, &files)
+    }
+
+    /// The bytes named `digest`, or `None` if they are absent; damaged ones are removed and count as absent.
+    ///
+    /// # Errors
+    /// They are there and cannot be read.
+    pub fn get(&self, digest: &Digest) -> Result<Option<Arc<[u8]>>, Error> {
+        for path in self.paths(BLOBS, digest, "") {
+            let Some(bytes) = self.read_if_present(&path)? else { continue };
+            if Digest::of(&bytes) == *digest {
+                return Ok(Some(bytes.into()));
+            }
+            self.drop_damaged(&path);
+        }
         Ok(None)
     }
 
     /// Whether a blob of this name and length is there (its content is checked when it is read).
     pub fn contains(&self, digest: &Digest, bytes: u64) -> bool {
-        fs::metadata(self.path("cas", digest, "")).is_ok_and(|metadata| metadata.len() == bytes)
+        self.paths(BLOBS, digest, "").iter().any(|path| match self.fs.facts(path) {
+            Ok(facts) if facts.bytes == bytes => {
+                self.mark_used(path, facts);
+                true
+            }
+            Ok(_) | Err(_) => false,
+        })
     }
 
-    /// The record of the action with this key, if all it made is still there.
+    /// Whether everything that an action made is there.
+    pub(crate) fn has_outputs(&self, record: &ActionRecord) -> bool {
+        record.result.outputs.iter().all(|output| self.contains(&output.digest, output.bytes))
+    }
+
+    /// The record of the action with this key. What it made may be gone.
+    ///
+    /// # Errors
+    /// It is there and cannot be read.
     pub fn record(&self, key: &Digest) -> Result<Option<ActionRecord>, Error> {
-        let Some(record) = self.record_of_past(key)? else { return Ok(None) };
-        let complete = record.outputs.iter().all(|output| self.contains(&output.digest, output.bytes));
-        Ok((complete && record.key() == *key).then_some(record))
-    }
-
-    /// The same, even if what it made is gone: for explanations only.
-    pub(crate) fn record_of_past(&self, key: &Digest) -> Result<Option<ActionRecord>, Error> {
-        self.read_json(&self.path("actions", key, ".json"))
-    }
-
-    /// Keeps an action's record under its key.
-    pub fn put_record(&self, record: &ActionRecord) -> Result<(), Error> {
-        write_json(&self.path("actions", &record.key(), ".json"), record)
+        let record: Option<ActionRecord> = self.read_document(&self.paths(RECORDS, key, ".json"))?;
+        Ok(record.filter(|record| record.key() == *key))
     }
 
     /// How many damaged files were dropped since the store was opened.
@@ -119,86 +247,131 @@ impl Store {
         self.damaged.load(Ordering::Relaxed)
     }
 
-    pub(crate) fn scan_path(&self, key: &Digest) -> PathBuf {
-        self.path("scans", key, ".json")
+    /// How many bytes were written since the store was opened.
+    pub fn written_bytes(&self) -> u64 {
+        self.written_bytes.load(Ordering::Relaxed)
     }
 
-    pub(crate) fn project_path(&self, key: &Digest) -> PathBuf {
-        self.root.join("projects").join(format!("{key}.json"))
+    /// Reads a list of earlier scans.
+    pub(crate) fn scans<T: DeserializeOwned + Default>(&self, key: &Digest) -> Result<T, Error> {
+        Ok(self.read_document(&self.paths(SCANS, key, ".json"))?.unwrap_or_default())
     }
 
-    pub(crate) fn read_json<T: DeserializeOwned>(&self, path: &Path) -> Result<Option<T>, Error> {
-        let Some(bytes) = read_if_present(path)? else { return Ok(None) };
-        let parsed = serde_json::from_slice(&bytes).ok();
-        if parsed.is_none() {
-            self.drop_damaged(path);
+    pub(crate) fn put_scans<T: Serialize>(&self, key: &Digest, scans: &T) -> Result<(), Error> {
+        self.write_document(&self.new_path(SCANS, key, ".json"), scans)
+    }
+
+    /// Reads a document of a project; one that is damaged counts as absent.
+    pub(crate) fn project_document<T: DeserializeOwned>(
+        &self,
+        project: &Digest,
+        name: &str,
+    ) -> Result<Option<T>, Error> {
+        let below = Path::new(PROJECTS).join(project.to_string()).join(name);
+        let paths: Vec<PathBuf> = self.roots().map(|root| root.join(&below)).collect();
+        self.read_document(&paths)
+    }
+
+    /// Writes a document of a project, unless it is there as it is; returns whether it was written.
+    pub(crate) fn put_project_document<T: Serialize>(
+        &self,
+        project: &Digest,
+        name: &str,
+        value: &T,
+    ) -> Result<bool, Error> {
+        let path = self.write_root().join(PROJECTS).join(project.to_string()).join(name);
+        let bytes = document::encode(&path, value)?;
+        if let Ok(facts) = self.fs.facts(&path)
+            && facts.bytes == bytes.len() as u64
+            && self.fs.read(&path).is_ok_and(|known| known == bytes)
+        {
+            self.mark_used(&path, facts);
+            return Ok(false);
         }
-        Ok(parsed)
+        write_all_atomically(&*self.fs, &[(path, &bytes)])?;
+        Ok(true)
     }
 
-    fn path(&self, folder: &str, digest: &Digest, suffix: &str) -> PathBuf {
-        let name = digest.to_string();
-        self.root.join(folder).join(&name[..2]).join(format!("{name}{suffix}"))
+    /// A file of a project that is locked for as long as the returned handle lives; `None` where that cannot be done.
+    pub fn lock_project(&self, project: &Digest, name: &str) -> Option<File> {
+        let folder = self.write_root().join(PROJECTS).join(project.to_string());
+        self.fs.create_folder(&folder).ok()?;
+        let file =
+            OpenOptions::new().write(true).create(true).truncate(false).open(folder.join(name)).ok()?;
+        file.lock().ok()?;
+        Some(file)
     }
 
-    fn drop_damaged(&self, path: &Path) {
+    fn read_document<T: DeserializeOwned>(&self, paths: &[PathBuf]) -> Result<Option<T>, Error> {
+        for path in paths {
+            let Some(bytes) = self.read_if_present(path)? else { continue };
+            match document::decode(path, &bytes) {
+                Some(document) => return Ok(Some(document)),
+                None => self.drop_damaged(path),
+            }
+        }
+        Ok(None)
+    }
+
+    fn write_document<T: Serialize>(&self, path: &Path, value: &T) -> Result<(), Error> {
+        let bytes = document::encode(path, value)?;
+        write_all_atomically(&*self.fs, &[(path.to_owned(), &bytes)])
+    }
+
+    fn roots(&self) -> impl Iterator<Item = &Path> {
+        self.scratch.iter().map(tempfile::TempDir::path).chain([self.root.as_path()])
+    }
+
+    fn write_root(&self) -> &Path {
+        self.scratch.as_ref().map_or(&self.root, tempfile::TempDir::path)
+    }
+
+    fn new_path(&self, folder: &str, digest: &Digest, suffix: &str) -> PathBuf {
+        file_of(self.write_root(), folder, digest, suffix)
+    }
+
+    /// Where a file may be, the first place first.
+    fn paths(&self, folder: &str, digest: &Digest, suffix: &str) -> Vec<PathBuf> {
+        self.roots().map(|root| file_of(root, folder, digest, suffix)).collect()
+    }
+
+    fn mark_used(&self, path: &Path, facts: FileFacts) {
+        // A mark in the future is a clock's mistake and would never grow old.
+        if SystemTime::now().duration_since(facts.modified).map_or(true, |age| age > USE_MARK_AGE) {
+            // A read-only cache keeps no marks.
+            let _ = self.fs.touch(path);
+        }
+    }
+
+    pub(crate) fn drop_damaged(&self, path: &Path) {
         self.damaged.fetch_add(1, Ordering::Relaxed);
         // A read-only cache cannot drop it; the file stays and stays ignored.
-        let _ = fs::remove_file(path);
+        let _ = self.fs.remove(path);
+    }
+
+    fn read_if_present(&self, path: &Path) -> Result<Option<Vec<u8>>, Error> {
+        match self.fs.read(path) {
+            Ok(bytes) => Ok(Some(bytes)),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(Error::io("read", path)(error)),
+        }
     }
 }
 
-fn read_if_present(path: &Path) -> Result<Option<Vec<u8>>, Error> {
-    match fs::read(path) {
-        Ok(bytes) => Ok(Some(bytes)),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        Err(error) => Err(Error::io("read", path)(error)),
-    }
+fn prepare(fs: &dyn FileSystem, root: &Path) -> io::Result<()> {
+    [BLOBS, RECORDS, SCANS, PROJECTS].iter().try_for_each(|folder| fs.create_folder(&root.join(folder)))?;
+    // Folders that are there say nothing of whether files can be made in them.
+    let probe = root.join(temporary_name());
+    fs.write_new(&probe, b"")?;
+    fs.remove(&probe)
 }
 
-pub(crate) fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<(), Error> {
-    let text = serde_json::to_vec(value).map_err(|error| Error::Io {
-        operation: "encode",
-        path: path.to_owned(),
-        source: error.into(),
-    })?;
-    write_atomically(path, &text)
+fn is_read_only(error: &io::Error) -> bool {
+    use io::ErrorKind::{PermissionDenied, QuotaExceeded, ReadOnlyFilesystem, StorageFull};
+    matches!(error.kind(), ReadOnlyFilesystem | PermissionDenied | StorageFull | QuotaExceeded)
 }
 
-/// Writes a file whole: temporary name in the same folder, sync, rename. Creates the folder.
-pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    fs::create_dir_all(folder).map_err(Error::io("create the folder", folder))?;
-    let mut file = tempfile::Builder::new()
-        .prefix(".kiln-")
-        .tempfile_in(folder)
-        .map_err(Error::io("create a temporary file in", folder))?;
-    file.write_all(bytes).map_err(Error::io("write", path))?;
-    file.as_file().sync_data().map_err(Error::io("sync", path))?;
-    set_ordinary_mode(file.as_file()).map_err(Error::io("set the mode of", path))?;
-    file.persist(path).map_err(|error| Error::io("rename to", path)(error.error))?;
-    Ok(())
-}
-
-/// Temporary files are private; what they become is for everybody whom the user's umask lets in.
-#[cfg(unix)]
-fn set_ordinary_mode(file: &fs::File) -> std::io::Result<()> {
-    use std::os::unix::fs::PermissionsExt as _;
-    file.set_permissions(fs::Permissions::from_mode(0o666 & !umask()))
-}
-
-#[cfg(not(unix))]
-fn set_ordinary_mode(_: &fs::File) -> std::io::Result<()> {
-    Ok(())
-}
-
-#[cfg(unix)]
-fn umask() -> u32 {
-    // Reading the mask means setting it; doing so once keeps the window small.
-    static UMASK: std::sync::OnceLock<u32> = std::sync::OnceLock::new();
-    *UMASK.get_or_init(|| {
-        let mask = rustix::process::umask(rustix::fs::Mode::from_raw_mode(0o077));
-        rustix::process::umask(mask);
-        mask.as_raw_mode()
-    })
+fn file_of(root: &Path, folder: &str, digest: &Digest, suffix: &str) -> PathBuf {
+    let name = digest.to_string();
+    root.join(folder).join(&name[..2]).join(name + suffix)
 }

@@ -1,11 +1,10 @@
 //! The thread that builds: one batch at a time, cancelled by the next.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-use kiln_build::{Engine, Error, RunOptions, Status, Targets};
+use kiln_build::{ActionId, Engine, Error, Outcome, RunOptions, Status};
 use kiln_link::{ActionTime, ProgressReport, RevisionTable, Server, Work};
 use kiln_project::{Built, build, write_outputs};
 
@@ -43,6 +42,7 @@ impl Drop for Builder {
 
 pub(crate) struct BuilderOptions {
     pub(crate) jobs: usize,
+    pub(crate) memory_bytes: u64,
     pub(crate) write_outputs: bool,
 }
 
@@ -83,32 +83,39 @@ struct BuilderThread {
 
 impl BuilderThread {
     fn run(&self, requests: &Receiver<Batch>, built: &impl Fn(BuildResult)) {
-        let mut last = self.engine.last_targets();
+        // The watcher tells what changes from here on; before it, anything may have.
+        let mut knows_all = false;
         while let Ok(batch) = requests.recv() {
-            match Self::guarded(|| self.build(&last)) {
+            let changed: Option<Vec<String>> =
+                (knows_all && !batch.files.is_empty()).then(|| batch.files.iter().cloned().collect());
+            // No collection may take what a build counts on.
+            let _hold = self.engine.store().hold();
+            match Self::guarded(|| self.build(changed.as_deref())) {
                 Ok(None) => built(BuildResult::Cancelled(batch)),
                 Ok(Some(done)) => {
-                    last = done.targets.clone();
-                    let output_dir = self.output_dir(&done);
+                    knows_all = true;
+                    let (targets, output_dir) = (done.targets.clone(), done.plan.project.output_dir.clone());
                     built(BuildResult::Done(Box::new(to_table(done, batch))));
-                    // Clients first; the files for engines can follow.
-                    if self.options.write_outputs
-                        && let Err(error) =
-                            Self::guarded(|| write_outputs(self.engine.store(), &last, &output_dir))
-                    {
+                    // Clients first; files for engines and the memory can follow.
+                    let finish = || {
+                        if self.options.write_outputs {
+                            write_outputs(&self.engine, &targets, &output_dir)?;
+                        }
+                        self.engine.save_memory()
+                    };
+                    if let Err(error) = Self::guarded(finish) {
                         built(BuildResult::OutputsFailed(error));
                     }
                 }
-                Err(error) => built(BuildResult::Failed(error)),
+                Err(error) => {
+                    knows_all = false;
+                    built(BuildResult::Failed(error));
+                }
             }
         }
     }
 
-    fn output_dir(&self, built: &Built) -> PathBuf {
-        self.engine.folder().join(&built.plan.project.output_dir)
-    }
-
-    fn build(&self, last: &Targets) -> Result<Option<Built>, Error> {
+    fn build(&self, changed: Option<&[String]>) -> Result<Option<Built>, Error> {
         let (done, total) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let report = |current: &str| {
             let (done, total) = (done.load(Ordering::Relaxed), total.load(Ordering::Relaxed));
@@ -121,8 +128,14 @@ impl BuilderThread {
                 total.store(all, Ordering::Relaxed);
             }
         };
-        let options = RunOptions { jobs: self.options.jobs, cancel: &self.cancel, progress: &progress };
-        let result = build(&self.engine, last, &options);
+        let options = RunOptions {
+            jobs: self.options.jobs,
+            memory_bytes: self.options.memory_bytes,
+            keep_going: true,
+            cancel: &self.cancel,
+            progress: &progress,
+        };
+        let result = build(&self.engine, changed, &options);
         report("");
         result
     }
@@ -140,22 +153,24 @@ fn to_table(built: Built, batch: Batch) -> RevisionTable {
     let mut work = to_work(&built);
     work.changed_files = batch.files.into_iter().collect();
     work.noticed_unix_ms = batch.noticed_unix_ms;
-    RevisionTable { number: 0, targets: built.targets, diagnostics: built.diagnostics, work }
+    // Only the engine, which keeps what is published, may have a share in it still.
+    let targets = Arc::unwrap_or_clone(built.targets);
+    RevisionTable { number: 0, targets, diagnostics: built.diagnostics, work }
 }
 
 /// What a build did, as it is published; without the edits that began it, which the build does not know.
 pub fn to_work(built: &Built) -> Work {
-    let outcomes = &built.report.outcomes;
-    let time = |name: &String| {
-        let outcome = outcomes
-            .iter()
-            .find(|outcome| outcome.record.as_ref().is_some_and(|record| record.name == *name))?;
-        let (Some(record), Status::Ran { reason }) = (&outcome.record, &outcome.status) else { return None };
-        Some(ActionTime { name: name.clone(), wall_ms: record.wall_ms, reason: reason.clone() })
+    let time = |id: &ActionId| match built.report.outcome(*id) {
+        Outcome { status: Status::Ran { reason }, record: Some(record) } => Some(ActionTime {
+            name: record.name.clone(),
+            wall_ms: record.result.wall_ms,
+            reason: reason.to_string(),
+        }),
+        _ => None,
     };
     Work {
         ran: built.report.ended.iter().filter_map(time).collect(),
-        reused: outcomes.iter().filter(|outcome| outcome.status == Status::Reused).count(),
+        reused: built.report.reused_count(),
         plan_ms: built.plan_ms,
         run_ms: built.run_ms,
         ..Work::default()

@@ -1,11 +1,12 @@
 //! The loop.
 
+use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::SystemTime;
 
-use kiln_build::{Engine, Error};
+use kiln_build::{Engine, Error, Store};
 use kiln_link::{LockError, ProjectLock, RevisionTable, Server, ServerEvent, socket_path};
 
 use crate::builder::{BuildResult, Builder, BuilderOptions};
@@ -20,6 +21,8 @@ pub struct DaemonOptions {
     pub cache: PathBuf,
     /// Worker threads.
     pub jobs: usize,
+    /// What the actions at work may take together, in bytes.
+    pub memory_bytes: u64,
     /// Whether baked files are written after each build.
     pub write_outputs: bool,
 }
@@ -111,7 +114,7 @@ pub struct Daemon {
 impl Daemon {
     /// Locks the project, begins to watch and to listen, and starts the first build.
     pub fn start(options: &DaemonOptions) -> Result<Daemon, DaemonError> {
-        let engine = Arc::new(Engine::open(&options.folder, &options.cache)?);
+        let engine = Arc::new(Engine::open(&options.folder, Store::open(&options.cache)?)?);
         let folder = engine.folder().to_owned();
         let at = |socket: PathBuf| move |source| DaemonError::Socket { socket, source };
         let socket = socket_path(&folder).map_err(at(folder.clone()))?;
@@ -134,7 +137,11 @@ impl Daemon {
         let mut watch = Watch::start(&folder, send_batches(sender.clone(), Event::Files))?;
         watch.set_relevant(&[kiln_project::PROJECT_FILE.to_owned()]);
         let built = sender.clone();
-        let builder_options = BuilderOptions { jobs: options.jobs, write_outputs: options.write_outputs };
+        let builder_options = BuilderOptions {
+            jobs: options.jobs,
+            memory_bytes: options.memory_bytes,
+            write_outputs: options.write_outputs,
+        };
         let builder = Builder::start(engine.clone(), server.clone(), builder_options, move |result| {
             // Fails only when the daemon has ended.
             let _ = built.send(Event::Built(result));
@@ -222,9 +229,13 @@ impl Daemon {
             // A plan that broke off has not looked at everything that matters.
             relevant.extend(std::mem::take(&mut self.relevant));
         }
-        self.watch.set_relevant(&relevant);
-        self.relevant = relevant;
-        unseen.merge(Batch::now(sources.changed_since_seen()));
+        if relevant != self.relevant {
+            self.watch.set_relevant(&relevant);
+            let old: HashSet<&String> = self.relevant.iter().collect();
+            let new = relevant.iter().filter(|path| !old.contains(path));
+            unseen.merge(Batch::now(sources.changed_since_seen(new)));
+            self.relevant = relevant;
+        }
         if !unseen.files.is_empty() {
             notify(Notice::Building { files: unseen.files.iter().cloned().collect() });
             self.begin_build(unseen);

@@ -20,6 +20,35 @@ pub fn choose_adapter(
     best.cloned().ok_or_else(|| "none of those present can draw to this window".to_owned())
 }
 
+/// An adapter of this machine.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FoundAdapter {
+    /// As [`describe_adapter`] words it.
+    pub description: String,
+    /// Longest edge of a texture, in texels.
+    pub texture_edge_max: u32,
+    /// Whether it draws on the CPU.
+    pub is_software: bool,
+    /// Whether [`crate::Gpu::headless`] would take it.
+    pub is_chosen: bool,
+}
+
+/// Every adapter that drivers other than GL offer, whose libraries would complain where there is no display.
+pub fn list_adapters() -> Vec<FoundAdapter> {
+    let adapters = crate::adapters_of(wgpu::Backends::PRIMARY);
+    let chosen = choose_adapter(&adapters, None).ok().map(|adapter| adapter.get_info());
+    let found = adapters.iter().map(|adapter| {
+        let info = adapter.get_info();
+        FoundAdapter {
+            description: describe_adapter(&info),
+            texture_edge_max: adapter.limits().max_texture_dimension_2d,
+            is_software: info.device_type == DeviceType::Cpu,
+            is_chosen: chosen.as_ref() == Some(&info),
+        }
+    });
+    found.collect()
+}
+
 /// Smaller is better: hardware before software, then explicit interfaces before GL, then power.
 pub(crate) fn rank(info: &AdapterInfo) -> (bool, bool, u8) {
     let power = match info.device_type {

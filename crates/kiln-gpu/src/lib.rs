@@ -10,7 +10,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-pub use adapter::{choose_adapter, describe_adapter, device_descriptor};
+pub use adapter::{FoundAdapter, choose_adapter, describe_adapter, device_descriptor, list_adapters};
 
 mod adapter;
 mod readback;
@@ -160,10 +160,13 @@ impl Faults {
 
 /// A panic elsewhere leaves the log readable: it holds plain text.
 fn adapter_of(backends: wgpu::Backends) -> Result<wgpu::Adapter, String> {
+    choose_adapter(&adapters_of(backends), None)
+}
+
+fn adapters_of(backends: wgpu::Backends) -> Vec<wgpu::Adapter> {
     let descriptor =
         wgpu::InstanceDescriptor { backends, ..wgpu::InstanceDescriptor::new_without_display_handle() };
-    let adapters = pollster::block_on(wgpu::Instance::new(descriptor).enumerate_adapters(backends));
-    choose_adapter(&adapters, None)
+    pollster::block_on(wgpu::Instance::new(descriptor).enumerate_adapters(backends))
 }
 
 fn lock(faults: &Mutex<Faults>) -> MutexGuard<'_, Faults> {

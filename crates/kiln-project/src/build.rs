@@ -1,12 +1,13 @@
-//! Plan, run, resolve: one build of a project.
+//! Plan, run, resolve, publish: one build of a project.
 
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-use kiln_build::{Engine, Error, RunOptions, RunReport, Targets};
-use kiln_diagnostic::Diagnostic;
+use kiln_build::{ActionId, Engine, Error, RunOptions, RunReport, TargetState, Targets};
+use kiln_diagnostic::{Diagnostic, Severity};
 
-use crate::plan::{Plan, plan};
+use crate::plan::{PartSpec, Plan, TargetSpec, plan};
 
 /// A finished build.
 pub struct Built {
@@ -14,8 +15,8 @@ pub struct Built {
     pub plan: Plan,
     /// What happened.
     pub report: RunReport,
-    /// Every target with its state.
-    pub targets: Targets,
+    /// Every target with its state, as published.
+    pub targets: Arc<Targets>,
     /// Everything that was said.
     pub diagnostics: Vec<Diagnostic>,
     /// From the call to the plan, milliseconds.
@@ -24,26 +25,29 @@ pub struct Built {
     pub run_ms: f64,
 }
 
-/// Builds a project: runs what is out of date and nothing else. Targets whose sources have an error keep the
-/// content that `last` has for them. A cancelled build returns `None` and changes nothing that is published.
+/// Builds a project: runs what is out of date and nothing else, and publishes the result in the store. Targets whose
+/// sources have an error keep the content that was published last. `changed` names the files that may be different since
+/// this engine's last build; `None` stands for all. A cancelled build returns `None` and changes nothing that is
+/// published. [`Engine::save_memory`] is left to the caller, who may have more urgent things to do first.
 ///
 /// # Errors
 /// The tool could not do its work (see [`Error`]); the input is not to blame.
-pub fn build(engine: &Engine, last: &Targets, options: &RunOptions) -> Result<Option<Built>, Error> {
-    let mut last = last.clone();
-    last.retain(|_, target| {
-        target.parts.iter().all(|part| engine.store().contains(&part.digest, part.bytes))
-    });
+pub fn build(
+    engine: &Engine,
+    changed: Option<&[String]>,
+    options: &RunOptions,
+) -> Result<Option<Built>, Error> {
+    let mut changed = changed;
     let mut tries = 0;
     loop {
-        let damaged_before = engine.store().damaged_count();
-        let result = build_once(engine, &last, options);
+        let result = build_once(engine, changed, options);
         // Damage is found, and dropped, one blob at a time; a source that changed while it was read is seen as it is at
         // the second look.
-        let is_healing = engine.store().damaged_count() > damaged_before && tries < HEALING_TRIES_MAX;
-        if result.is_ok() || options.cancel.load(Ordering::SeqCst) || !(is_healing || tries == 0) {
+        let is_healing = matches!(result, Err(Error::Lost { .. } | Error::SourceChanged { .. }));
+        if !is_healing || tries == HEALING_TRIES_MAX || options.cancel.load(Ordering::SeqCst) {
             return result;
         }
+        changed = None;
         tries += 1;
     }
 }
@@ -51,17 +55,43 @@ pub fn build(engine: &Engine, last: &Targets, options: &RunOptions) -> Result<Op
 /// More damaged blobs than this in one build are a broken disk.
 const HEALING_TRIES_MAX: usize = 64;
 
-fn build_once(engine: &Engine, last: &Targets, options: &RunOptions) -> Result<Option<Built>, Error> {
+fn build_once(
+    engine: &Engine,
+    changed: Option<&[String]>,
+    options: &RunOptions,
+) -> Result<Option<Built>, Error> {
     let start = Instant::now();
-    let plan = plan(engine)?;
+    let plan = plan(engine, changed)?;
     let plan_ms = start.elapsed().as_secs_f64() * 1e3;
     let start = Instant::now();
     let report = engine.run(&plan.graph, options)?;
     let run_ms = start.elapsed().as_secs_f64() * 1e3;
-    if !report.is_complete() {
+    if !report.is_complete() && options.cancel.load(Ordering::SeqCst) {
         return Ok(None);
     }
-    let (targets, diagnostics) = plan.resolve(&report, last);
-    engine.save(targets.clone())?;
+    let (targets, diagnostics) = plan.resolve(engine, &report)?;
+    let targets = Arc::new(targets);
+    engine.publish(&targets)?;
     Ok(Some(Built { plan, report, targets, diagnostics, plan_ms, run_ms }))
+}
+
+impl Built {
+    /// What keeps a target from being what its sources say: the errors of the actions behind it. `None` if it is well.
+    pub fn trouble_of(&self, target: &TargetSpec) -> Option<Vec<Diagnostic>> {
+        if self.targets.get(&target.name).is_some_and(|target| target.state == TargetState::Fresh) {
+            return None;
+        }
+        let first: Vec<ActionId> = target.parts.iter().map(PartSpec::action).collect();
+        let behind = self.plan.graph.with_upstream(&first);
+        let mut said: Vec<Diagnostic> = self
+            .report
+            .diagnostics()
+            .filter(|(action, diagnostic)| behind.contains(action) && diagnostic.severity == Severity::Error)
+            .map(|(action, diagnostic)| self.plan.with_subject(action, diagnostic))
+            .collect();
+        if said.is_empty() {
+            said.push(Diagnostic::error(format!("`{}` was not made from its present sources", target.name)));
+        }
+        Some(said)
+    }
 }

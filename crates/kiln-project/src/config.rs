@@ -26,6 +26,8 @@ pub struct Project {
     pub shaders: BTreeMap<String, ShaderConfig>,
     /// Folder for baked files, relative to the project.
     pub output_dir: String,
+    /// What the baked files may take together: the budget of `[check]`.
+    pub bytes_max: Option<u64>,
 }
 
 /// An environment and the quality it is baked with.
@@ -112,12 +114,13 @@ pub fn parse_project(text: &str) -> (Project, Vec<Diagnostic>) {
         scenes: BTreeMap::new(),
         shaders: BTreeMap::new(),
         output_dir: "baked".to_owned(),
+        bytes_max: None,
     };
     read_root(&mut document, root.get_ref(), &mut project);
     (project, document.diagnostics)
 }
 
-const TABLES: [&str; 6] = ["version", "project", "env", "scene", "shader", "output"];
+const TABLES: [&str; 7] = ["version", "project", "env", "scene", "shader", "output", "check"];
 
 fn read_root<'a>(document: &mut Document<'a>, root: &DeTable<'a>, project: &mut Project) {
     check_version(document, root);
@@ -140,6 +143,9 @@ fn read_root<'a>(document: &mut Document<'a>, root: &DeTable<'a>, project: &mut 
                 if let Some(dir) = read_output_dir(section) {
                     project.output_dir = dir;
                 }
+            }),
+            "check" => read_single(document, "check", value, |section| {
+                project.bytes_max = section.bytes("max_bytes");
             }),
             "env" => read_named(document, "env", value, |section, _| read_env(section), &mut project.envs),
             "scene" => {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use kiln_bake::{Accuracy, Analysis, AnalysisRequest, EncodedLevel, TexelFormat};
-use kiln_build::{Action, ActionId, ActionOutput, Engine, Error, Input, Inputs};
+use kiln_build::{Action, ActionId, ActionOutput, Command, Engine, Error, Input, Inputs, little_memory};
 use kiln_diagnostic::Diagnostic;
 use kiln_image::{Cube, Decoded, Limits, Panorama, TexelPolicy, check_texels};
 use serde::{Deserialize, Serialize};
@@ -32,6 +32,9 @@ const MIRROR: &str = "mirror";
 /// equal maps share a key.
 const LEVEL: &str = "level";
 
+/// The skybox's levels: outputs `levels/mip0` … of its action.
+const LEVELS: &str = "levels";
+
 /// What later steps must know of a decoded panorama without reading it.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Report {
@@ -46,6 +49,9 @@ pub(crate) fn plan_environment(planner: &mut Planner, engine: &Engine, name: &st
     let decode = planner.graph.add(steps.decode(engine));
     let analyse = planner.graph.add(steps.analyse(decode));
     let skybox = planner.graph.add(steps.skybox(decode));
+    for action in [decode, skybox] {
+        planner.subjects.insert(action, env.source.clone());
+    }
     let irradiance = planner.graph.add(steps.irradiance(decode, analyse));
     let sh = planner.graph.add(steps.sh(analyse));
     let target = |map: &str| format!("env/{name}/{map}");
@@ -88,13 +94,13 @@ impl Steps<'_> {
     fn action(
         &self,
         step: &str,
-        (kind, recipe): (&'static str, u32),
-        params: Value,
+        command: Command,
         inputs: Vec<Input>,
         perform: impl Fn(&Inputs) -> Result<ActionOutput, Error> + Send + Sync + 'static,
     ) -> Action {
-        let name = format!("{kind} env/{}{step}", self.name);
-        Action { name, kind, recipe, params, inputs, rank: rank::ENVIRONMENT, perform: Arc::new(perform) }
+        let name = format!("{} env/{}{step}", command.kind, self.name);
+        let memory = little_memory();
+        Action { name, command, inputs, rank: rank::ENVIRONMENT, memory, perform: Arc::new(perform) }
     }
 
     fn encoding(&self) -> Value {
@@ -104,18 +110,14 @@ impl Steps<'_> {
     fn decode(&self, engine: &Engine) -> Action {
         let source = engine.source(&self.env.source);
         let input = Input::Source { path: self.env.source.clone(), digest: source.digest() };
-        let (path, name, policy) = (self.env.source.clone(), self.name.to_owned(), self.env.texels);
-        let unreadable = unreadable(engine, &path);
-        // Its messages name both.
-        let params =
-            json!({"texels": policy_name(policy), "unreadable": unreadable, "env": name, "source": path});
-        self.action("", ("decode", 1), params, vec![input], move |inputs| {
+        let policy = self.env.texels;
+        let unreadable = unreadable(engine, &self.env.source);
+        let params = json!({"texels": policy_name(policy), "unreadable": unreadable});
+        let command = command("decode", 2, params, &["panorama", "report"]);
+        self.action("", command, vec![input], move |inputs| {
             Ok(match inputs.bytes(0)? {
-                Some(bytes) => decode(&bytes, &path, policy),
-                None => {
-                    let section = format!("env.{name}");
-                    failure(no_content("environment", &path, unreadable.as_deref(), &section))
-                }
+                Some(bytes) => decode(&bytes, policy),
+                None => failure(no_content("environment", unreadable.as_deref())),
             })
         })
     }
@@ -125,7 +127,8 @@ impl Steps<'_> {
         let roughness = if count > 1 { kiln_bake::roughness_of_level(1, count) } else { 1.0 };
         let request = AnalysisRequest { alpha_min: roughness * roughness, error: self.env.error };
         let params = json!({"alpha_min": request.alpha_min, "error": request.error});
-        self.action("", ("analyse", 1), params, vec![output(decode, "panorama")], move |inputs| {
+        let command = command("analyse", 1, params, &["analysis"]);
+        self.action("", command, vec![output(decode, "panorama")], move |inputs| {
             let analysis = kiln_bake::analyse(&panorama(inputs, 0)?, &request);
             let meta = json!({"detail": {"band_limit": analysis.band_limit(), "mean": analysis.mean()}});
             Ok(success("analysis", analysis.to_bytes(), meta))
@@ -137,9 +140,8 @@ impl Steps<'_> {
         let inputs = vec![output(decode, "panorama"), output(decode, "report")];
         let mut params = self.encoding();
         params["mirror_size"] = json!(env.size);
-        // Its note names the file.
-        params["source"] = json!(env.source);
-        self.action("", ("skybox", 1), params, inputs, move |inputs| {
+        let command = command("skybox", 2, params, &[LEVELS, MIRROR]);
+        self.action("", command, inputs, move |inputs| {
             let panorama = panorama(inputs, 0)?;
             let report = report(inputs, 1)?;
             let face_size = skybox_face_size(report.width);
@@ -155,10 +157,10 @@ impl Steps<'_> {
                 Some(level) => encoded[level].bytes.clone(),
                 None => encode.level(&kiln_bake::skybox(&panorama, env.size)[0]).bytes,
             };
-            let named =
-                encoded.into_iter().enumerate().map(|(index, level)| (format!("mip{index}"), level.bytes));
+            let name = |index: usize| format!("{LEVELS}/mip{index}");
+            let named = encoded.into_iter().enumerate().map(|(index, level)| (name(index), level.bytes));
             let outputs = named.chain([(MIRROR.to_owned(), mirror)]).collect();
-            Ok(ActionOutput { outputs, meta, diagnostics: encode.notes(&env.source) })
+            Ok(ActionOutput { outputs, meta, diagnostics: encode.notes() })
         })
     }
 
@@ -167,7 +169,7 @@ impl Steps<'_> {
         let mut params = self.encoding();
         params["size"] = json!(env.irradiance_size);
         let inputs = vec![output(analyse, "analysis"), output(decode, "report")];
-        self.action("", ("irradiance", 1), params, inputs, move |inputs| {
+        self.action("", command("irradiance", 1, params, &[LEVEL]), inputs, move |inputs| {
             let map = kiln_bake::irradiance(&analysis(inputs, 0)?, env.irradiance_size);
             Ok(Encode::new(&env, &report(inputs, 1)?).output(LEVEL, &map.cube, accuracy_facts(&map.accuracy)))
         })
@@ -175,7 +177,7 @@ impl Steps<'_> {
 
     fn sh(&self, analyse: ActionId) -> Action {
         let params = json!({"order": SH_ORDER});
-        self.action("", ("sh", 1), params, vec![output(analyse, "analysis")], |inputs| {
+        self.action("", command("sh", 1, params, &["json"]), vec![output(analyse, "analysis")], |inputs| {
             let analysis = analysis(inputs, 0)?;
             let mut text = serde_json::to_vec_pretty(&json!({
                 "convention": SH_CONVENTION,
@@ -197,7 +199,8 @@ impl Steps<'_> {
         params["size"] = json!(face_size);
         params["alpha"] = json!(roughness * roughness);
         let inputs = vec![output(analyse, "analysis"), output(decode, "report")];
-        self.action(&format!("/specular mip {level}"), ("prefilter", 1), params, inputs, move |inputs| {
+        let command = command("prefilter", 1, params, &[LEVEL]);
+        self.action(&format!("/specular mip {level}"), command, inputs, move |inputs| {
             let map = kiln_bake::specular_level(&analysis(inputs, 0)?, roughness * roughness, face_size);
             let mut detail = accuracy_facts(&map.accuracy);
             detail["roughness"] = json!(roughness);
@@ -206,25 +209,24 @@ impl Steps<'_> {
     }
 }
 
-fn decode(bytes: &[u8], path: &str, policy: TexelPolicy) -> ActionOutput {
+fn decode(bytes: &[u8], policy: TexelPolicy) -> ActionOutput {
     let decoded = match kiln_image::decode(bytes, &Limits::default()) {
         Ok(decoded) => decoded,
         Err(error) => {
             let help = "export the panorama again as .hdr or .exr";
-            return failure(Diagnostic::error(error.to_string()).in_file(path).with_help(help));
+            return failure(Diagnostic::error(error.to_string()).with_help(help));
         }
     };
     let Decoded { mut image, format, notes } = decoded;
-    let mut diagnostics: Vec<Diagnostic> =
-        notes.into_iter().map(|note| Diagnostic::note(note).in_file(path)).collect();
+    let mut diagnostics: Vec<Diagnostic> = notes.into_iter().map(Diagnostic::note).collect();
     match policy.apply(&mut image) {
-        Err(error) => return failure(Diagnostic::error(error.to_string()).in_file(path)),
+        Err(error) => return failure(Diagnostic::error(error.to_string())),
         Ok(repair) if repair.non_finite + repair.negative > 0 => {
             let message = format!(
                 "repaired {} non-finite and {} negative values; relative flux moved {:.2e}",
                 repair.non_finite, repair.negative, repair.flux_moved
             );
-            diagnostics.push(Diagnostic::warning(message).in_file(path));
+            diagnostics.push(Diagnostic::warning(message));
         }
         Ok(_) => {}
     }
@@ -232,7 +234,7 @@ fn decode(bytes: &[u8], path: &str, policy: TexelPolicy) -> ActionOutput {
     let (width, height) = (image.width, image.height);
     let panorama = match Panorama::new(image) {
         Ok(panorama) => panorama,
-        Err(error) => return failure(Diagnostic::error(error.to_string()).in_file(path)),
+        Err(error) => return failure(Diagnostic::error(error.to_string())),
     };
     let report = serde_json::to_vec(&Report { width, height, max }).unwrap_or_default();
     let meta = json!({"detail": {"format": format, "width": width, "height": height, "max": max}});
@@ -273,7 +275,7 @@ impl Encode {
     }
 
     /// Said once per environment, with the skybox.
-    fn notes(&self, source: &str) -> Vec<Diagnostic> {
+    fn notes(&self) -> Vec<Diagnostic> {
         if self.scale_log2 == 0 {
             return Vec::new();
         }
@@ -281,11 +283,7 @@ impl Encode {
             "the peak {:.3e} is above the half float's 65504: texels are stored divided by 2^{}",
             self.max, self.scale_log2
         );
-        vec![
-            Diagnostic::note(message)
-                .in_file(source)
-                .with_help("`range = \"f32\"` stores 32-bit floats instead"),
-        ]
+        vec![Diagnostic::note(message).with_help("`range = \"f32\"` stores 32-bit floats instead")]
     }
 }
 
@@ -304,6 +302,11 @@ fn skybox_face_size(width: usize) -> usize {
 
 fn output(action: ActionId, output: &str) -> Input {
     Input::Output { action, output: output.to_owned() }
+}
+
+pub(crate) fn command(kind: &str, recipe: u32, params: Value, outputs: &[&str]) -> Command {
+    let outputs = outputs.iter().map(|&output| output.to_owned()).collect();
+    Command { kind: kind.to_owned(), recipe, params, outputs }
 }
 
 pub(crate) fn success(name: &str, bytes: Vec<u8>, meta: Value) -> ActionOutput {

@@ -10,12 +10,21 @@
 //! Not here: how maps are computed (`kiln-bake`), caching (`kiln-build`), watching (`kiln-daemon`).
 
 pub use build::{Built, build};
+// The limits of an environment are those of its recipe.
+pub use check::{Difference, DifferenceKind, differences};
 pub use config::{EnvConfig, Project, Range, Role, SceneConfig, ShaderConfig, parse_project};
-pub use output::{Manifest, ManifestTarget, Written, write_outputs};
-pub use plan::{Plan, TargetSpec, plan};
+pub use kiln_bake::BAND_LIMIT_MAX;
+pub use output::{
+    MANIFEST_FILE, Manifest, ManifestFile, ManifestTarget, Written, manifest_of, write_outputs,
+};
+pub use plan::{PartSpec, Plan, TargetSpec, plan};
+pub use reader::{parse_bytes, suggest};
+pub use verify::{Mismatch, Verified, VerifyError, verify};
+pub use why::{ActionWhy, CutOff, last_build, why, with_values};
 
 mod blob;
 mod build;
+mod check;
 mod config;
 mod environment;
 mod output;
@@ -25,6 +34,8 @@ mod scene;
 mod shader;
 #[cfg(test)]
 mod tests;
+mod verify;
+mod why;
 
 /// Name of the project file.
 pub const PROJECT_FILE: &str = "kiln.toml";

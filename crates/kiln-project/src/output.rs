@@ -1,23 +1,29 @@
 //! Baked files for engines and `manifest.json` for CI.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Component, Path};
 use std::sync::Arc;
 
-use kiln_build::{Digest, Error, Store, Target, TargetState, Targets, write_atomically};
+use kiln_build::{Digest, Engine, Error, Store, Target, TargetState, Targets, write_atomically};
 use kiln_image::ktx2;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 /// Version of the manifest's form.
 const MANIFEST_SCHEMA: u32 = 1;
-const MANIFEST_FILE: &str = "manifest.json";
+/// Version of the code that makes files of targets: raise it whenever the same target may give other bytes.
+const WRITER_RECIPE: u32 = 1;
+/// Name of the manifest in the folder of baked files.
+pub const MANIFEST_FILE: &str = "manifest.json";
 
 /// What a folder of baked files holds: sorted, without times or absolute paths, so that it can be committed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
     /// Version of this form.
     pub schema: u32,
+    /// Version of the code that made the files.
+    #[serde(default)]
+    pub writer: u32,
     /// Target name to what it is.
     pub targets: BTreeMap<String, ManifestTarget>,
 }
@@ -46,8 +52,34 @@ pub struct ManifestFile {
     pub bytes: u64,
 }
 
+impl Manifest {
+    /// Reads a manifest from its text; `None` if it is none, or of another schema.
+    pub fn parse(text: &[u8]) -> Option<Manifest> {
+        let manifest: Option<Manifest> = serde_json::from_slice(text).ok();
+        manifest.filter(|manifest| manifest.schema == MANIFEST_SCHEMA)
+    }
+
+    /// Length of all files.
+    pub fn bytes(&self) -> u64 {
+        self.targets.values().map(ManifestTarget::bytes).sum()
+    }
+
+    fn text(&self) -> Vec<u8> {
+        let mut text = serde_json::to_vec_pretty(self).unwrap_or_default();
+        text.push(b'\n');
+        text
+    }
+}
+
+impl ManifestTarget {
+    /// Length of its files.
+    pub fn bytes(&self) -> u64 {
+        self.files.values().map(|file| file.bytes).sum()
+    }
+}
+
 /// What [`write_outputs`] did.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Written {
     /// Files written, relative to the folder.
     pub written: Vec<String>,
@@ -55,70 +87,107 @@ pub struct Written {
     pub kept: usize,
     /// Files of earlier builds that no target makes any more.
     pub removed: Vec<String>,
+    /// What the folder holds now.
+    pub manifest: Manifest,
 }
 
-/// Writes the files of every target that changed since the folder's manifest was written, and the manifest.
-/// A file is taken as unchanged if the old manifest names the same target digest and its length is right.
+/// The manifest that [`write_outputs`] would write. Files of targets that `known` has as they are need not be made again.
+///
+/// # Errors
+/// A target's content cannot be read from the store.
+pub fn manifest_of(store: &Store, targets: &Targets, known: &Manifest) -> Result<Manifest, Error> {
+    let mut manifest = empty_manifest();
+    for (name, target) in targets {
+        let sha256 = target.digest();
+        let files = match known.unchanged(name, sha256) {
+            Some(known) => known.files.clone(),
+            None => {
+                target_files(store, name, target)?.iter().map(|(path, bytes)| entry(path, bytes)).collect()
+            }
+        };
+        manifest.targets.insert(name.clone(), manifest_target(target, sha256, files));
+    }
+    Ok(manifest)
+}
+
+/// Writes the files of every target that changed since the folder's manifest was written, or that are no longer as it
+/// says, and the manifest.
 ///
 /// # Errors
 /// A file cannot be read from the store or written.
-pub fn write_outputs(store: &Store, targets: &Targets, folder: &Path) -> Result<Written, Error> {
-    let old = read_manifest(folder);
-    let unchanged = |name: &String, target: &Target| {
-        let known = old.targets.get(name)?;
-        (known.sha256 == target.digest() && all_present(folder, known)).then_some(known)
+pub fn write_outputs(engine: &Engine, targets: &Targets, output_dir: &str) -> Result<Written, Error> {
+    // Two processes would mix their files.
+    let _lock = engine.lock_outputs();
+    let outputs = engine.outputs();
+    outputs.refresh();
+    let folder = engine.folder().join(output_dir);
+    let old_text = std::fs::read(folder.join(MANIFEST_FILE)).unwrap_or_default();
+    let old = Manifest::parse(&old_text).unwrap_or_default();
+    let is_as_stated = |(path, file): (&String, &ManifestFile)| {
+        outputs.state(&format!("{output_dir}/{path}")).digest() == Some(file.sha256)
     };
-    let mut manifest = Manifest { schema: MANIFEST_SCHEMA, ..Manifest::default() };
-    let mut written = Written::default();
-    let kept =
-        targets.iter().filter_map(|(name, target)| Some((name.clone(), unchanged(name, target)?.clone())));
-    manifest.targets.extend(kept);
-    if manifest.targets.len() < targets.len() && manifest != old {
-        // Until the files are written nothing may vouch for them.
-        write_manifest(folder, &manifest)?;
-    }
+    let mut manifest = empty_manifest();
+    let mut changed = Vec::new();
     for (name, target) in targets {
-        let files = match manifest.targets.get(name) {
+        let sha256 = target.digest();
+        match old.unchanged(name, sha256).filter(|known| known.files.iter().all(is_as_stated)) {
             Some(known) => {
-                written.kept += known.files.len();
-                known.files.clone()
+                manifest.targets.insert(name.clone(), manifest_target(target, sha256, known.files.clone()));
             }
-            None => write_target(store, name, target, folder, &mut written)?,
-        };
-        let entry = ManifestTarget {
-            kind: target.kind.clone(),
-            sha256: target.digest(),
-            state: target.state,
-            files,
-            facts: target.meta.clone(),
-        };
-        manifest.targets.insert(name.clone(), entry);
+            None => changed.push((name, target, sha256)),
+        }
     }
-    remove_orphans(folder, &old, &manifest, &mut written);
-    if manifest != old {
-        write_manifest(folder, &manifest)?;
+    let mut written = Written {
+        kept: manifest.targets.values().map(|target| target.files.len()).sum(),
+        ..Written::default()
+    };
+    let fs = engine.store().file_system();
+    if !changed.is_empty() && !old.targets.is_empty() {
+        // Until the files are written nothing may vouch for them.
+        write_atomically(fs, &folder.join(MANIFEST_FILE), &manifest.text())?;
+    }
+    for (name, target, sha256) in changed {
+        let mut files = BTreeMap::new();
+        for (path, bytes) in target_files(engine.store(), name, target)? {
+            write_atomically(fs, &folder.join(&path), &bytes)?;
+            files.extend([entry(&path, &bytes)]);
+            written.written.push(path);
+        }
+        manifest.targets.insert(name.clone(), manifest_target(target, sha256, files));
+    }
+    remove_orphans(&folder, &old, &manifest, &mut written);
+    let text = manifest.text();
+    if text != old_text {
+        write_atomically(fs, &folder.join(MANIFEST_FILE), &text)?;
         written.written.push(MANIFEST_FILE.to_owned());
     }
+    written.manifest = manifest;
     Ok(written)
 }
 
-fn write_manifest(folder: &Path, manifest: &Manifest) -> Result<(), Error> {
-    let mut text = serde_json::to_string_pretty(manifest).unwrap_or_default();
-    text.push('\n');
-    write_atomically(&folder.join(MANIFEST_FILE), text.as_bytes())
+fn empty_manifest() -> Manifest {
+    Manifest { schema: MANIFEST_SCHEMA, writer: WRITER_RECIPE, targets: BTreeMap::new() }
 }
 
-/// A manifest that is missing, damaged or of another schema says nothing about the folder.
-fn read_manifest(folder: &Path) -> Manifest {
-    let text = std::fs::read(folder.join(MANIFEST_FILE)).unwrap_or_default();
-    let manifest: Option<Manifest> = serde_json::from_slice(&text).ok();
-    manifest.filter(|manifest| manifest.schema == MANIFEST_SCHEMA).unwrap_or_default()
+impl Manifest {
+    /// The entry of a target, if files made of this content are the same today.
+    fn unchanged(&self, name: &str, sha256: Digest) -> Option<&ManifestTarget> {
+        self.targets.get(name).filter(|known| known.sha256 == sha256 && self.writer == WRITER_RECIPE)
+    }
 }
 
-fn all_present(folder: &Path, target: &ManifestTarget) -> bool {
-    target.files.iter().all(|(path, file)| {
-        std::fs::metadata(folder.join(path)).is_ok_and(|metadata| metadata.len() == file.bytes)
-    })
+fn manifest_target(target: &Target, sha256: Digest, files: BTreeMap<String, ManifestFile>) -> ManifestTarget {
+    ManifestTarget {
+        kind: target.kind.clone(),
+        sha256,
+        state: target.state,
+        files,
+        facts: target.meta.clone(),
+    }
+}
+
+fn entry(path: &str, bytes: &[u8]) -> (String, ManifestFile) {
+    (path.to_owned(), ManifestFile { sha256: Digest::of(bytes), bytes: bytes.len() as u64 })
 }
 
 fn remove_orphans(folder: &Path, old: &Manifest, new: &Manifest, written: &mut Written) {
@@ -127,27 +196,11 @@ fn remove_orphans(folder: &Path, old: &Manifest, new: &Manifest, written: &mut W
     };
     for path in files(old).difference(&files(new)) {
         // Only what an earlier manifest claims is touched, and only below the folder.
-        let inside = Path::new(path).components().all(|part| matches!(part, std::path::Component::Normal(_)));
+        let inside = Path::new(path).components().all(|part| matches!(part, Component::Normal(_)));
         if inside && std::fs::remove_file(folder.join(path)).is_ok() {
             written.removed.push(path.clone());
         }
     }
-}
-
-fn write_target(
-    store: &Store,
-    name: &str,
-    target: &Target,
-    folder: &Path,
-    written: &mut Written,
-) -> Result<BTreeMap<String, ManifestFile>, Error> {
-    let mut files = BTreeMap::new();
-    for (path, bytes) in target_files(store, name, target)? {
-        write_atomically(&folder.join(&path), &bytes)?;
-        files.insert(path.clone(), ManifestFile { sha256: Digest::of(&bytes), bytes: bytes.len() as u64 });
-        written.written.push(path);
-    }
-    Ok(files)
 }
 
 /// Path and content.
@@ -156,11 +209,8 @@ type OutputFile = (String, Arc<[u8]>);
 fn target_files(store: &Store, name: &str, target: &Target) -> Result<Vec<OutputFile>, Error> {
     let mut contents = Vec::with_capacity(target.parts.len());
     for part in &target.parts {
-        let bytes = store.get(&part.digest)?.ok_or_else(|| Error::Action {
-            action: format!("write {name}"),
-            reason: format!("{} was damaged in the store and has been dropped; build again", part.name),
-        })?;
-        contents.push((part.name.as_str(), bytes));
+        let lost = || Error::Lost { what: format!("{} of {name}", part.name) };
+        contents.push((part.name.as_str(), store.get(&part.digest)?.ok_or_else(lost)?));
     }
     Ok(match target.kind.as_str() {
         "cube" | "lut" => vec![(format!("{name}.ktx2"), texture_file(name, target, &contents).into())],

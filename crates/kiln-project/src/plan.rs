@@ -1,5 +1,7 @@
 //! From kiln.toml and the sources to a graph of actions and the targets they make.
 
+use std::collections::BTreeMap;
+
 use kiln_build::{
     ActionId, ActionRecord, Engine, Error, Graph, OutputRecord, Part, RunReport, SourceState, Target,
     TargetState, Targets,
@@ -19,6 +21,8 @@ pub struct Plan {
     pub targets: Vec<TargetSpec>,
     /// What is wrong with kiln.toml or found while planning.
     pub diagnostics: Vec<Diagnostic>,
+    /// The file that an action's messages are about, where they name none themselves.
+    subjects: BTreeMap<ActionId, String>,
 }
 
 /// A target and the actions whose outputs it consists of.
@@ -45,7 +49,7 @@ pub enum PartSpec {
         /// What it is called in the target.
         part: String,
     },
-    /// The outputs `mip0`, `mip1` … of an action, however many there are.
+    /// The outputs `levels/mip0`, `levels/mip1` … of an action, however many there are.
     Levels(ActionId),
 }
 
@@ -73,9 +77,10 @@ impl PartSpec {
         match self {
             PartSpec::One { output, part, .. } => Some(vec![named(part, outcome.output(output)?)]),
             PartSpec::Levels(_) => {
-                let outputs = outcome.record.as_ref()?.outputs.iter();
-                let levels = outputs.filter(|output| output.name.starts_with("mip"));
-                let parts: Vec<Part> = levels.map(|output| named(&output.name, output)).collect();
+                let outputs = outcome.record.as_ref()?.result.outputs.iter();
+                let levels =
+                    outputs.filter_map(|output| Some((output.name.strip_prefix("levels/")?, output)));
+                let parts: Vec<Part> = levels.map(|(name, output)| named(name, output)).collect();
                 (!parts.is_empty()).then_some(parts)
             }
         }
@@ -95,10 +100,12 @@ pub(crate) struct Planner {
     pub(crate) graph: Graph,
     pub(crate) targets: Vec<TargetSpec>,
     pub(crate) diagnostics: Vec<Diagnostic>,
+    pub(crate) subjects: BTreeMap<ActionId, String>,
 }
 
 impl Planner {
     pub(crate) fn target(&mut self, name: String, kind: &'static str, meta: Value, parts: Vec<PartSpec>) {
+        parts.iter().for_each(|part| self.graph.want(part.action()));
         self.targets.push(TargetSpec { name, kind, meta, parts });
     }
 }
@@ -112,24 +119,22 @@ pub(crate) fn unreadable(engine: &Engine, path: &str) -> Option<String> {
     }
 }
 
-/// What to say of a source without content.
-pub(crate) fn no_content(what: &str, path: &str, unreadable: Option<&str>, section: &str) -> Diagnostic {
+/// What to say of a source without content; the plan adds which.
+pub(crate) fn no_content(what: &str, unreadable: Option<&str>) -> Diagnostic {
     match unreadable {
-        Some(reason) => {
-            Diagnostic::error(format!("the {what}'s file cannot be read: {reason}")).in_file(path)
-        }
+        Some(reason) => Diagnostic::error(format!("the {what}'s file cannot be read: {reason}")),
         None => Diagnostic::error(format!("the {what}'s file was not found"))
-            .in_file(path)
-            .with_help(format!("create it, or correct `source` in [{section}] of kiln.toml")),
+            .with_help("create it, or correct `source` in kiln.toml"),
     }
 }
 
-/// Plans a project: reads kiln.toml, scans scenes and shaders for what they need.
+/// Plans a project: reads kiln.toml, scans scenes and shaders for what they need. `changed` names the files that may be
+/// different since this engine's last plan; `None` stands for all.
 ///
 /// # Errors
 /// The store cannot be used. Errors of the project are in [`Plan::diagnostics`].
-pub fn plan(engine: &Engine) -> Result<Plan, Error> {
-    engine.sources().refresh();
+pub fn plan(engine: &Engine, changed: Option<&[String]>) -> Result<Plan, Error> {
+    engine.begin_plan(changed);
     let mut planner = Planner::default();
     let project = read_project(engine, &mut planner.diagnostics);
     let mut variants = shader::Variants::default();
@@ -151,8 +156,8 @@ pub fn plan(engine: &Engine) -> Result<Plan, Error> {
         "envs": project.envs.keys().collect::<Vec<_>>(),
     });
     planner.target("project".to_owned(), "project", meta, Vec::new());
-    let Planner { graph, targets, diagnostics } = planner;
-    Ok(Plan { project, graph, targets, diagnostics })
+    let Planner { graph, targets, diagnostics, subjects } = planner;
+    Ok(Plan { project, graph, targets, diagnostics, subjects })
 }
 
 fn read_project(engine: &Engine, diagnostics: &mut Vec<Diagnostic>) -> Project {
@@ -172,17 +177,42 @@ fn read_project(engine: &Engine, diagnostics: &mut Vec<Diagnostic>) -> Project {
 }
 
 impl Plan {
-    /// Joins what the actions made into targets. One whose actions failed keeps its content in `last`, marked
-    /// stale; one that nothing asks for any more goes, unless an error may be what hides the wish for it.
-    pub fn resolve(&self, report: &RunReport, last: &Targets) -> (Targets, Vec<Diagnostic>) {
+    /// The actions whose outputs a target consists of, or the action of that name.
+    pub fn actions_of(&self, name: &str) -> Option<Vec<ActionId>> {
+        if let Some(target) = self.targets.iter().find(|target| target.name == name) {
+            let mut actions: Vec<ActionId> = target.parts.iter().map(PartSpec::action).collect();
+            actions.dedup();
+            return Some(actions);
+        }
+        let action = self.graph.iter().find(|(_, action)| action.name == name)?;
+        Some(vec![action.0])
+    }
+
+    /// A message of an action with the file that it is about.
+    pub(crate) fn with_subject(&self, action: ActionId, diagnostic: &Diagnostic) -> Diagnostic {
+        let mut diagnostic = diagnostic.clone();
+        if diagnostic.file.is_none() {
+            diagnostic.file = self.subjects.get(&action).cloned();
+        }
+        diagnostic
+    }
+
+    /// Joins what the actions made into targets. One whose actions failed keeps the content that was published last,
+    /// marked stale; one that nothing asks for any more goes, unless an error may be what hides the wish for it.
+    ///
+    /// # Errors
+    /// What was published last cannot be read.
+    pub fn resolve(&self, engine: &Engine, report: &RunReport) -> Result<(Targets, Vec<Diagnostic>), Error> {
         let mut diagnostics = self.diagnostics.clone();
-        for diagnostic in report.diagnostics() {
-            if !diagnostics.contains(diagnostic) {
-                diagnostics.push(diagnostic.clone());
+        for (action, diagnostic) in report.diagnostics() {
+            let diagnostic = self.with_subject(action, diagnostic);
+            if !diagnostics.contains(&diagnostic) {
+                diagnostics.push(diagnostic);
             }
         }
         let mut targets = Targets::new();
         if has_errors(&diagnostics) {
+            let last = engine.published()?;
             targets.extend(last.iter().map(|(name, target)| (name.clone(), target.clone().into_stale())));
         }
         for spec in &self.targets {
@@ -195,11 +225,11 @@ impl Plan {
                     format!("`{}` was made, but not all of its parts; this is a fault of Kiln", spec.name);
                 diagnostics.push(Diagnostic::error(message));
             }
-            if let Some(target) = last.get(&spec.name) {
+            if let Some(target) = engine.published()?.get(&spec.name) {
                 targets.insert(spec.name.clone(), target.clone().into_stale());
             }
         }
-        (targets, diagnostics)
+        Ok((targets, diagnostics))
     }
 }
 
@@ -217,13 +247,13 @@ fn gather_meta(spec: &TargetSpec, report: &RunReport) -> Value {
     let mut actions: Vec<ActionId> = spec.parts.iter().map(PartSpec::action).collect();
     actions.dedup();
     let records: Vec<&ActionRecord> =
-        actions.iter().filter_map(|action| report.outcome(*action).record.as_ref()).collect();
+        actions.iter().filter_map(|action| report.outcome(*action).record.as_deref()).collect();
     let mut details = Vec::new();
     for record in &records {
-        if let Some(shared) = record.meta.get("shared").and_then(Value::as_object) {
+        if let Some(shared) = record.result.meta.get("shared").and_then(Value::as_object) {
             meta.extend(shared.clone());
         }
-        if let Some(detail) = record.meta.get("detail") {
+        if let Some(detail) = record.result.meta.get("detail") {
             details.push(detail.clone());
         }
     }
@@ -232,7 +262,8 @@ fn gather_meta(spec: &TargetSpec, report: &RunReport) -> Value {
     }
     let mut recipes: Vec<Value> = Vec::new();
     for record in records {
-        let recipe = json!({"kind": record.kind, "recipe": record.recipe, "parameters": record.params});
+        let kiln_build::Command { kind, recipe, params, .. } = &record.command;
+        let recipe = json!({"kind": kind, "recipe": recipe, "parameters": params});
         recipes.push(recipe);
     }
     if !recipes.is_empty() {

@@ -130,6 +130,25 @@ impl<'a, 'd> Section<'a, 'd> {
         number
     }
 
+    /// A number of bytes: an integer, or a text as `64 MiB`.
+    pub(crate) fn bytes(&mut self, key: &'static str) -> Option<u64> {
+        if self.find(key)?.get_ref().as_str().is_none() {
+            let bytes = self.integer(key, 0..=usize::MAX)?;
+            return u64::try_from(bytes).ok();
+        }
+        let text = self.text(key)?;
+        let bytes = parse_bytes(&text);
+        if bytes.is_none() {
+            let message = format!("`{key}` in [{}] is `{text}`, which is no size", self.name);
+            self.fail(
+                message,
+                self.place(key),
+                Some("write it as `64 MiB`, `1.5 GiB` or `200000`".to_owned()),
+            );
+        }
+        bytes
+    }
+
     /// One of a few words.
     pub(crate) fn choice<T: Copy>(&mut self, key: &'static str, choices: &[(&str, T)]) -> Option<T> {
         let place = self.place(key);
@@ -169,8 +188,33 @@ impl<'a, 'd> Section<'a, 'd> {
 }
 
 /// "did you mean …", if something known is close enough to what was written.
-pub(crate) fn suggest<'a>(written: &str, known: impl Iterator<Item = &'a str>) -> Option<String> {
+pub fn suggest<'a>(written: &str, known: impl Iterator<Item = &'a str>) -> Option<String> {
     let scored = known.map(|word| (strsim::jaro_winkler(written, word), word));
     let best = scored.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(a.1)))?;
     (best.0 > 0.75).then(|| format!("did you mean `{}`?", best.1))
+}
+
+/// A number of bytes from a text as `200000`, `64 MiB`, `1.5GB`; units of 1024 with `i`, of 1000 without.
+pub fn parse_bytes(text: &str) -> Option<u64> {
+    const UNITS: [(&str, f64); 11] = [
+        ("", 1.0),
+        ("B", 1.0),
+        ("K", 1024.0),
+        ("M", 1_048_576.0),
+        ("G", 1_073_741_824.0),
+        ("KiB", 1024.0),
+        ("MiB", 1_048_576.0),
+        ("GiB", 1_073_741_824.0),
+        ("kB", 1e3),
+        ("MB", 1e6),
+        ("GB", 1e9),
+    ];
+    let text = text.trim();
+    let end =
+        text.find(|character: char| !character.is_ascii_digit() && character != '.').unwrap_or(text.len());
+    let (number, unit) = text.split_at(end);
+    let scale = UNITS.iter().find(|(name, _)| *name == unit.trim())?.1;
+    let bytes = number.parse::<f64>().ok()? * scale;
+    // Up to 2^53 every whole number of bytes is exact.
+    (bytes >= 0.0 && bytes < 9e15).then_some(bytes as u64)
 }

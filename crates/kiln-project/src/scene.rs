@@ -3,14 +3,14 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use kiln_build::{Action, ActionOutput, Engine, Error, Input, Tracker};
+use kiln_build::{Action, ActionOutput, Engine, Error, Input, Tracker, little_memory};
 use kiln_diagnostic::{Diagnostic, has_errors};
 use kiln_scene::{EffectSet, variant_name};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::SceneConfig;
-use crate::environment::failure;
+use crate::environment::{command, failure};
 use crate::plan::{PartSpec, Planner, no_content, rank, unreadable};
 use crate::shader::Variants;
 
@@ -34,34 +34,38 @@ pub(crate) fn plan_scene(
 ) -> Result<(), Error> {
     let scan =
         engine.scan("scene", PACK_RECIPE, &config.source, |tracker| scan_scene(&config.source, tracker))?;
-    let found: SceneScan = serde_json::from_value(scan.found).unwrap_or_default();
+    let found = SceneScan::deserialize(&scan.found).unwrap_or_default();
     for effects in found.effect_sets {
         variants.ask(&config.shader, effects.into_iter().collect());
     }
     let inputs =
         scan.looked_at.iter().map(|(path, digest)| Input::Source { path: path.clone(), digest: *digest });
-    let (source, paths, section) = (config.source.clone(), scan.looked_at.clone(), format!("scene.{name}"));
+    let (source, files) = (config.source.clone(), scan.clone());
     let unreadable = unreadable(engine, &source);
     let pack = planner.graph.add(Action {
         name: format!("pack scene/{name}"),
-        kind: "pack",
-        recipe: PACK_RECIPE,
-        // Its messages name them.
-        params: json!({"source": source, "section": section, "unreadable": unreadable}),
+        command: command(
+            "pack",
+            PACK_RECIPE,
+            json!({"source": source, "unreadable": unreadable}),
+            &["glb", "effects"],
+        ),
         inputs: inputs.collect(),
         rank: rank::SCENE,
+        memory: little_memory(),
         perform: Arc::new(move |inputs| {
             let mut contents = BTreeMap::new();
-            for (index, (path, _)) in paths.iter().enumerate() {
+            for (index, (path, _)) in files.looked_at.iter().enumerate() {
                 contents.insert(path.as_str(), inputs.bytes(index)?);
             }
             let mut read = |path: &str| contents.get(path).cloned().flatten();
             Ok(match read(&source) {
                 Some(bytes) => pack_scene(&source, &bytes, &mut read),
-                None => failure(no_content("scene", &source, unreadable.as_deref(), &section)),
+                None => failure(no_content("scene", unreadable.as_deref())),
             })
         }),
     });
+    planner.subjects.insert(pack, config.source.clone());
     let meta = json!({"env": config.env, "shader": config.shader});
     let parts = vec![PartSpec::one(pack, "glb"), PartSpec::one(pack, "effects")];
     planner.target(format!("scene/{name}"), "scene", meta, parts);

@@ -3,10 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use kiln_build::{Action, ActionOutput, Engine, Error, Input};
+use kiln_build::{Action, ActionOutput, Engine, Error, Input, little_memory};
 use serde_json::{Value, json};
 
-use crate::environment::{failure, success};
+use crate::environment::{command, failure, success};
 use crate::plan::{PartSpec, Planner, no_content, rank, unreadable};
 use crate::{Role, ShaderConfig};
 
@@ -55,33 +55,32 @@ pub(crate) fn plan_shader(
         let inputs = scan.looked_at.iter();
         let inputs = inputs.map(|(path, digest)| Input::Source { path: path.clone(), digest: *digest });
         let meta = json!({"shader": name, "role": config.role.name(), "features": features});
-        let (root, paths, section) =
-            (config.source.clone(), scan.looked_at.clone(), format!("shader.{name}"));
+        let (root, files) = (config.source.clone(), scan.clone());
         let unreadable = unreadable(engine, &root);
         let compile = planner.graph.add(Action {
             name: format!("compile {target}"),
-            kind: "compile",
-            recipe: COMPILE_RECIPE,
-            params: json!({
-                "root": root,
-                "features": features,
-                "section": section,
-                "unreadable": unreadable,
-            }),
+            command: command(
+                "compile",
+                COMPILE_RECIPE,
+                json!({"root": root, "features": features, "unreadable": unreadable}),
+                &["wgsl", "reflection"],
+            ),
             inputs: inputs.collect(),
             rank: rank::SHADER,
+            memory: little_memory(),
             perform: Arc::new(move |inputs| {
                 let mut contents = BTreeMap::new();
-                for (index, (path, _)) in paths.iter().enumerate() {
+                for (index, (path, _)) in files.looked_at.iter().enumerate() {
                     contents.insert(path.as_str(), inputs.bytes(index)?);
                 }
                 let mut read = |path: &str| contents.get(path).cloned().flatten().map(|bytes| text(&bytes));
                 Ok(match read(&root) {
                     Some(_) => compile(&root, &features, &mut read),
-                    None => failure(no_content("shader", &root, unreadable.as_deref(), &section)),
+                    None => failure(no_content("shader", unreadable.as_deref())),
                 })
             }),
         });
+        planner.subjects.insert(compile, config.source.clone());
         let parts = vec![PartSpec::one(compile, "wgsl"), PartSpec::one(compile, "reflection")];
         planner.target(target, "shader", meta, parts);
     }
@@ -111,11 +110,15 @@ fn text(bytes: &[u8]) -> Arc<str> {
 pub(crate) fn plan_brdf_table(planner: &mut Planner) {
     let table = planner.graph.add(Action {
         name: "integrate lut/ggx".to_owned(),
-        kind: "brdf table",
-        recipe: 1,
-        params: json!({"size": BRDF_TABLE_SIZE, "masking": "height-correlated Smith"}),
+        command: command(
+            "brdf table",
+            1,
+            json!({"size": BRDF_TABLE_SIZE, "masking": "height-correlated Smith"}),
+            &["texels"],
+        ),
         inputs: Vec::new(),
         rank: rank::SCENE,
+        memory: little_memory(),
         perform: Arc::new(|_| {
             let texels = kiln_bake::dfg_table(BRDF_TABLE_SIZE);
             let bytes = texels.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();

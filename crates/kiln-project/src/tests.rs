@@ -1,7 +1,7 @@
 use std::fs;
 use std::sync::atomic::AtomicBool;
 
-use kiln_build::{Engine, RunOptions, Status, TargetState, Targets};
+use kiln_build::{Engine, Reason, RunOptions, Status, Store, TargetState, Targets};
 use kiln_diagnostic::{Diagnostic, Severity};
 use kiln_image::{Image, ktx2};
 
@@ -70,16 +70,24 @@ impl Place {
     }
 
     fn build(&self) -> Built {
-        let engine = Engine::open(self.folder.path(), self.cache.path()).unwrap();
+        let engine = self.engine();
         let cancel = AtomicBool::new(false);
-        let options = RunOptions { jobs: 2, cancel: &cancel, progress: &|_| {} };
-        build(&engine, &engine.last_targets(), &options).unwrap().unwrap()
+        let built = build(&engine, None, &options(&cancel)).unwrap().unwrap();
+        engine.save_memory().unwrap();
+        built
+    }
+
+    fn engine(&self) -> Engine {
+        Engine::open(self.folder.path(), Store::open(self.cache.path()).unwrap()).unwrap()
     }
 
     fn write_outputs(&self, targets: &Targets) -> Written {
-        let engine = Engine::open(self.folder.path(), self.cache.path()).unwrap();
-        write_outputs(engine.store(), targets, &self.folder.path().join("baked")).unwrap()
+        write_outputs(&self.engine(), targets, "baked").unwrap()
     }
+}
+
+fn options(cancel: &AtomicBool) -> RunOptions<'_> {
+    RunOptions { jobs: 2, memory_bytes: 1 << 30, keep_going: true, cancel, progress: &|_| {} }
 }
 
 fn panorama(value: f32) -> Vec<u8> {
@@ -89,7 +97,8 @@ fn panorama(value: f32) -> Vec<u8> {
 
 /// Names of the actions that ran, sorted.
 fn ran(built: &Built) -> Vec<String> {
-    let mut names = built.report.ended.clone();
+    let ended = built.report.ended.iter();
+    let mut names: Vec<String> = ended.map(|id| built.plan.graph.action(*id).name.clone()).collect();
     names.sort();
     names
 }
@@ -147,6 +156,190 @@ fn each_edit_runs_exactly_what_it_affects() {
     ];
     assert_eq!(ran(&place.build()), expected);
     assert!(ran(&place.build()).is_empty());
+}
+
+#[test]
+fn touched_file_runs_nothing() {
+    let place = Place::new();
+    place.build();
+    for file in ["room.hdr", "flat.wgsl", "quad.gltf", "kiln.toml"] {
+        let path = place.folder.path().join(file);
+        fs::write(&path, fs::read(&path).unwrap()).unwrap();
+    }
+    assert!(ran(&place.build()).is_empty());
+}
+
+#[test]
+fn renamed_file_is_decoded_again_and_nothing_above_it_runs() {
+    let place = Place::new();
+    let before = place.build().targets;
+    fs::rename(place.folder.path().join("room.hdr"), place.folder.path().join("hall.hdr")).unwrap();
+    place.edit("kiln.toml", "source = \"room.hdr\"", "source = \"hall.hdr\"");
+    let built = place.build();
+    assert_eq!(ran(&built), ["decode env/room"]);
+    assert_eq!(built.targets, before);
+}
+
+#[test]
+fn reverted_edit_runs_nothing() {
+    let place = Place::new();
+    let before = place.build().targets;
+    let good = fs::read(place.folder.path().join("room.hdr")).unwrap();
+    place.write("room.hdr", panorama(3.0));
+    assert_eq!(ran(&place.build()).len(), 6);
+    place.write("room.hdr", good);
+    let built = place.build();
+    assert!(ran(&built).is_empty());
+    assert_eq!(built.targets, before);
+}
+
+#[test]
+fn deleted_then_restored_file_runs_nothing() {
+    let place = Place::new();
+    let before = place.build().targets;
+    let good = fs::read(place.folder.path().join("quad.bin")).unwrap();
+    fs::remove_file(place.folder.path().join("quad.bin")).unwrap();
+    assert_eq!(ran(&place.build()), ["pack scene/quad"]);
+    place.write("quad.bin", good);
+    let built = place.build();
+    assert!(ran(&built).is_empty());
+    assert_eq!(built.targets, before);
+}
+
+#[test]
+fn parameter_that_changes_no_result_is_cut_off() {
+    let place = Place::new();
+    place.build();
+    place.edit("kiln.toml", "name = \"test\"", "name = \"other\"");
+    assert!(ran(&place.build()).is_empty(), "no action reads the project's name");
+    // Nothing needs repair, so each policy gives the same panorama.
+    place.edit("kiln.toml", "size = 8", "size = 8\ntexels = \"error\"");
+    assert_eq!(ran(&place.build()), ["decode env/room"]);
+}
+
+#[test]
+fn swapped_buffer_packs_the_scene_and_compiles_nothing() {
+    let place = Place::new();
+    place.build();
+    let mut buffer = fs::read(place.folder.path().join("quad.bin")).unwrap();
+    buffer[1] ^= 1;
+    place.write("quad.bin", buffer);
+    assert_eq!(ran(&place.build()), ["pack scene/quad"]);
+}
+
+#[test]
+fn include_that_was_missing_at_first_is_picked_up() {
+    let place = Place::new();
+    let include = fs::read(place.folder.path().join("lib/tint.wgsl")).unwrap();
+    fs::remove_file(place.folder.path().join("lib/tint.wgsl")).unwrap();
+    assert!(!errors(&place.build()).is_empty());
+    place.write("lib/tint.wgsl", include);
+    let built = place.build();
+    assert_eq!(ran(&built), ["compile shader/flat/base", "compile shader/flat/unlit"]);
+    assert!(errors(&built).is_empty());
+}
+
+#[test]
+fn rebuilt_cache_after_its_loss_gives_the_same_targets() {
+    let place = Place::new();
+    let before = place.build().targets;
+    fs::remove_dir_all(place.cache.path().join("v2")).unwrap();
+    let built = place.build();
+    assert!(built.report.outcomes.iter().all(|outcome| matches!(outcome.status, Status::Ran { .. })));
+    assert_eq!(built.targets, before);
+}
+
+#[test]
+fn why_follows_a_change_down_to_its_source_and_names_the_cut_off() {
+    let place = Place::new();
+    place.build();
+    place.write("room.hdr", panorama(2.0));
+    place.build();
+    let engine = place.engine();
+    let plan = plan(&engine, None).unwrap();
+    let found = why(&engine, &plan, "env/room/sh").unwrap().unwrap();
+    let names: Vec<&str> = found.iter().map(|why| why.action.as_str()).collect();
+    assert_eq!(names, ["sh env/room", "analyse env/room", "decode env/room"]);
+    assert!(found.iter().all(|why| why.now == "up to date"));
+    let change = found[2].change.as_ref().unwrap();
+    assert_eq!((change.build, change.since), (2, Some(1)));
+    assert!(matches!(&change.reason, Reason::Changed(changes) if changes[0].input() == Some("room.hdr")));
+
+    // A file with other bytes and the same texels: the comment line differs.
+    let mut bytes = panorama(2.0);
+    let at = bytes.windows(7).position(|window| window == b"FORMAT=").unwrap();
+    bytes.splice(at..at, b"# tuesday\n".iter().copied());
+    place.write("room.hdr", bytes);
+    let plan_now = crate::plan(&engine, None).unwrap();
+    let pending = why(&engine, &plan_now, "env/room/sh").unwrap().unwrap();
+    assert!(pending[2].now.starts_with("would run now: room.hdr: "), "{}", pending[2].now);
+    assert_eq!(ran(&place.build()), ["decode env/room"]);
+    let engine = place.engine();
+    let found = why(&engine, &plan_now, "env/room/sh").unwrap().unwrap();
+    assert_eq!(found[1].cut_off_by.len(), 1, "{found:?}");
+    assert_eq!(
+        (found[1].cut_off_by[0].action.as_str(), found[1].cut_off_by[0].build),
+        ("decode env/room", 3)
+    );
+    assert!(why(&engine, &plan_now, "env/rom/sh").unwrap().is_none());
+}
+
+#[test]
+fn verification_passes_on_what_was_built_and_fails_on_what_was_not() {
+    let place = Place::new();
+    let built = place.build();
+    let targets: Vec<String> = built.targets.keys().cloned().collect();
+    let cancel = AtomicBool::new(false);
+    let verified = verify(&place.engine(), &targets, &options(&cancel)).unwrap();
+    assert!(verified.mismatches.is_empty(), "{verified:?}");
+    assert_eq!(verified.actions, built.plan.graph.len());
+
+    // A store that somebody changed, digests and all: its bytes are not what the sources give.
+    let engine = place.engine();
+    let stored = &built.targets["lut/ggx"].parts[0];
+    let (record, _) = engine.history("integrate lut/ggx").unwrap();
+    let forged = [0_u8; 8];
+    let mut record = (*record).clone();
+    record.result.outputs[0].digest = engine.store().put(&forged).unwrap();
+    record.result.outputs[0].bytes = 8;
+    engine.store().put_result(&record, &[forged.to_vec().into()]).unwrap();
+    fs::remove_dir_all(place.cache.path().join("v2/projects")).unwrap();
+    let verified = verify(&place.engine(), &["lut/ggx".to_owned()], &options(&cancel)).unwrap();
+    assert_eq!(verified.mismatches.len(), 1);
+    assert_eq!(verified.mismatches[0].fresh, Some(stored.digest));
+
+    place.edit("lib/tint.wgsl", "0.25", "0.75");
+    let outdated = verify(&place.engine(), &["shader/flat/base".to_owned()], &options(&cancel));
+    assert!(matches!(outdated, Err(VerifyError::OutOfDate(_))));
+}
+
+#[test]
+fn manifest_without_baking_equals_the_written_one_and_shows_each_edit() {
+    let place = Place::new();
+    let targets = place.build().targets;
+    let committed = place.write_outputs(&targets).manifest;
+    let engine = place.engine();
+    assert_eq!(manifest_of(engine.store(), &targets, &Manifest::default()).unwrap(), committed);
+    place.edit("kiln.toml", "irradiance_size = 4", "irradiance_size = 2");
+    let present = manifest_of(engine.store(), &place.build().targets, &committed).unwrap();
+    let found = differences(&committed, &present);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert_eq!((found[0].target.as_str(), found[0].kind), ("env/room/irradiance", DifferenceKind::Changed));
+    assert!(found[0].details.contains(&"facts.size: 4 → 2".to_owned()), "{found:?}");
+}
+
+#[test]
+fn output_file_that_somebody_changed_is_written_again() {
+    let place = Place::new();
+    let targets = place.build().targets;
+    place.write_outputs(&targets);
+    let path = place.folder.path().join("baked/lut/ggx.ktx2");
+    let good = fs::read(&path).unwrap();
+    let mut bytes = good.clone();
+    *bytes.last_mut().unwrap() ^= 1;
+    fs::write(&path, bytes).unwrap();
+    assert_eq!(place.write_outputs(&targets).written, ["lut/ggx.ktx2"]);
+    assert_eq!(fs::read(&path).unwrap(), good);
 }
 
 #[test]
@@ -237,7 +430,7 @@ fn outputs_are_written_once_and_follow_the_targets() {
     assert_eq!((texture.faces, texture.levels.len(), texture.width), (6, 2, 8));
     fs::remove_file(place.folder.path().join("baked/lut/ggx.ktx2")).unwrap();
     assert_eq!(place.write_outputs(&targets).written, ["lut/ggx.ktx2"]);
-    let mut fewer = targets.clone();
+    let mut fewer = (*targets).clone();
     fewer.remove("scene/quad");
     let written = place.write_outputs(&fewer);
     assert_eq!(written.removed, ["scene/quad.effects.json", "scene/quad.glb"]);
@@ -276,6 +469,7 @@ fn wrong_project_files_are_explained() {
         ("version = 1\n[output]\ndir = \"../..\"\n", "folder inside the project", 3),
         ("version = 1\n[output]\ndir = \"/etc\"\n", "folder inside the project", 3),
         ("version = 1\n[output]\ndir = \".\"\n", "folder inside the project", 3),
+        ("version = 1\n[check]\nmax_bytes = \"64 MXB\"\n", "which is no size", 3),
         ("version = 1\n[env.a\nsource = \"a.hdr\"\n", "", 2),
         ("version = 1\n[env.\"a/b\"]\nsource = \"a.hdr\"\n", "letters, digits", 2),
     ];
@@ -337,7 +531,7 @@ fn smaller_chain_of_a_uniform_environment_is_complete() {
 fn every_flipped_bit_in_the_store_is_healed_by_the_next_build_and_write() {
     let place = Place::new();
     let good = place.build().targets;
-    for folder in fs::read_dir(place.cache.path().join("v1/cas")).unwrap() {
+    for folder in fs::read_dir(place.cache.path().join("v2/cas")).unwrap() {
         for blob in fs::read_dir(folder.unwrap().path()).unwrap() {
             let path = blob.unwrap().path();
             let mut bytes = fs::read(&path).unwrap();
@@ -345,10 +539,9 @@ fn every_flipped_bit_in_the_store_is_healed_by_the_next_build_and_write() {
             fs::write(&path, bytes).unwrap();
         }
     }
-    let engine = Engine::open(place.folder.path(), place.cache.path()).unwrap();
     for _ in 0..64 {
         let targets = place.build().targets;
-        if write_outputs(engine.store(), &targets, &place.folder.path().join("baked")).is_ok() {
+        if write_outputs(&place.engine(), &targets, "baked").is_ok() {
             assert_eq!(targets, good);
             return;
         }
@@ -365,4 +558,22 @@ fn source_that_is_no_file_is_refused_and_blocks_nothing() {
     let built = place.build();
     let text: String = errors(&built).iter().map(|error| error.to_string()).collect();
     assert!(text.contains("endless.wgsl") && text.contains("it is not a file"), "{text}");
+}
+
+#[test]
+fn sizes_are_read_with_their_units() {
+    let cases = [
+        ("200000", Some(200_000)),
+        ("64 MiB", Some(64 << 20)),
+        ("1.5GB", Some(1_500_000_000)),
+        ("2K", Some(2048)),
+    ];
+    for (text, expected) in cases {
+        assert_eq!(parse_bytes(text), expected, "{text}");
+    }
+    for wrong in ["", "MiB", "-1", "1 mile", "1e400", "99999999999 GiB"] {
+        assert_eq!(parse_bytes(wrong), None, "{wrong}");
+    }
+    assert_eq!(parse_project("version = 1\n[check]\nmax_bytes = \"2 KiB\"\n").0.bytes_max, Some(2048));
+    assert_eq!(parse_project("version = 1\n[check]\nmax_bytes = 4096\n").0.bytes_max, Some(4096));
 }

@@ -15,7 +15,7 @@ A first look:
   kiln preview look        the window (in a second terminal)
 
 Exit codes: 0 done, 1 the input is wrong (a diagnostic says what and where), 2 the tool failed.
-Artefacts are cached in $KILN_CACHE, or in your cache folder.")]
+Artefacts are cached in $KILN_CACHE, or in your cache folder, up to $KILN_CACHE_MAX (as 20GiB; 16GiB if unset).")]
 pub(crate) struct Args {
     #[command(subcommand)]
     pub(crate) command: Command,
@@ -27,6 +27,18 @@ pub(crate) enum Command {
     Init(InitArgs),
     /// Run every action that is out of date and no other; write KTX2 files and manifest.json
     Bake(BakeArgs),
+    /// Say what a bake would run, and why, without running it
+    Plan(ReadArgs),
+    /// Explain a target: what changed when, with old and new values, and why the rest was left alone
+    Why(WhyArgs),
+    /// Draw sources, actions and targets as DOT or SVG
+    Graph(GraphArgs),
+    /// Build a sample of the targets again in a fresh folder and compare the bytes
+    Verify(VerifyArgs),
+    /// Free cache space: what was not used for longest goes first, what is published stays
+    Gc(GcArgs),
+    /// Examine the cache, this machine's graphics adapters, and the limits
+    Doctor(DoctorArgs),
     /// Bake, then follow every edit and publish it to connected previews
     Watch(WatchArgs),
     /// Show what a watching kiln publishes, in a window or as PNG files
@@ -65,6 +77,97 @@ pub(crate) struct BuildArgs {
     /// Actions at once [default: the number of cores]
     #[arg(short, long)]
     pub(crate) jobs: Option<usize>,
+    /// What the actions at work may take together, as 4GiB [default: three quarters of what is free]
+    #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
+    pub(crate) memory: Option<u64>,
+    /// Print JSON instead of text
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// For commands that only read.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct ReadArgs {
+    /// The project's folder
+    #[arg(default_value = ".")]
+    pub(crate) dir: PathBuf,
+    /// Print JSON instead of text
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, ClapArgs)]
+pub(crate) struct WhyArgs {
+    /// A target, as env/sky/specular, or an action, as "decode env/sky"; without one the last builds are listed
+    pub(crate) target: Option<String>,
+    /// The project's folder
+    #[arg(long, default_value = ".")]
+    pub(crate) dir: PathBuf,
+    /// Print JSON instead of text
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, ClapArgs)]
+pub(crate) struct GraphArgs {
+    /// The project's folder
+    #[arg(default_value = ".")]
+    pub(crate) dir: PathBuf,
+    /// Only this target or action and what it depends on
+    #[arg(long)]
+    pub(crate) target: Option<String>,
+    /// The form of the picture [default: by the file's extension, else dot]
+    #[arg(long)]
+    pub(crate) format: Option<GraphFormat>,
+    /// Write to this file instead of standard output
+    #[arg(long)]
+    pub(crate) out: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum GraphFormat {
+    /// For Graphviz and its relatives
+    Dot,
+    /// A picture for browsers
+    Svg,
+}
+
+#[derive(Debug, ClapArgs)]
+pub(crate) struct VerifyArgs {
+    #[command(flatten)]
+    pub(crate) build: BuildArgs,
+    /// Verify these targets instead of a sample
+    #[arg(long = "target", value_name = "TARGET", conflicts_with_all = ["sample", "all"])]
+    pub(crate) targets: Vec<String>,
+    /// Number of targets in the sample
+    #[arg(long, default_value_t = 4)]
+    pub(crate) sample: usize,
+    /// Another seed takes another sample
+    #[arg(long, default_value_t = 0)]
+    pub(crate) seed: u64,
+    /// Verify every target
+    #[arg(long)]
+    pub(crate) all: bool,
+}
+
+#[derive(Debug, ClapArgs)]
+pub(crate) struct GcArgs {
+    /// Keep at most this much besides what is published, as 2GiB [default: $KILN_CACHE_MAX, else 16GiB]
+    #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
+    pub(crate) max_size: Option<u64>,
+    /// Only say what would go
+    #[arg(long)]
+    pub(crate) dry_run: bool,
+    /// Print JSON instead of text
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, ClapArgs)]
+pub(crate) struct DoctorArgs {
+    /// Read every cached file and drop those that are damaged
+    #[arg(long)]
+    pub(crate) deep: bool,
     /// Print JSON instead of text
     #[arg(long)]
     pub(crate) json: bool,
@@ -77,6 +180,29 @@ pub(crate) struct BakeArgs {
     /// Also print the time of every action that ran
     #[arg(long)]
     pub(crate) timings: bool,
+    /// Go on after an action whose input is at fault, as far as possible
+    #[arg(short, long)]
+    pub(crate) keep_going: bool,
+    /// Write nothing; exit with 1 if the manifest would change, and name what
+    #[arg(long)]
+    pub(crate) check: bool,
+    /// The manifest to check against [default: manifest.json in the project's output folder]
+    #[arg(long, value_name = "FILE", requires = "check")]
+    pub(crate) manifest: Option<PathBuf>,
+    /// Write a JUnit report, a test case for each target
+    #[arg(long, value_name = "FILE")]
+    pub(crate) junit: Option<PathBuf>,
+    /// Print diagnostics so that this CI host shows them at the line
+    #[arg(long, value_name = "HOST")]
+    pub(crate) annotate: Option<CiHost>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum CiHost {
+    /// GitHub Actions and its relatives (Forgejo, Gitea)
+    Github,
+    /// Azure Pipelines
+    Azure,
 }
 
 #[derive(Debug, ClapArgs)]
@@ -145,6 +271,10 @@ pub(crate) struct DemoArgs {
     /// Picture size in pixels
     #[arg(long, default_value = "640x360", value_parser = parse_size)]
     pub(crate) size: [u32; 2],
+}
+
+fn parse_bytes(text: &str) -> Result<u64, String> {
+    kiln_project::parse_bytes(text).ok_or_else(|| format!("`{text}` is no size; write it as 2GiB or 500MB"))
 }
 
 fn parse_size(text: &str) -> Result<[u32; 2], String> {

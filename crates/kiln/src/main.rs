@@ -7,14 +7,17 @@
 //!
 //! Not here: any work on light, shaders or scenes.
 
-#![expect(clippy::print_stdout, clippy::print_stderr, reason = "this is the program that talks to the user")]
+#![expect(clippy::print_stderr, reason = "this is the program that talks to the user")]
 
 use std::process::ExitCode;
 
 use clap::Parser as _;
 
 mod args;
+mod ci;
 mod commands;
+mod out;
+mod picture;
 mod place;
 mod report;
 mod sheet;
@@ -36,6 +39,12 @@ fn main() -> ExitCode {
     let result = match args.command {
         args::Command::Init(args) => commands::init::run(&args),
         args::Command::Bake(args) => commands::bake::run(&args),
+        args::Command::Plan(args) => commands::plan::run(&args),
+        args::Command::Why(args) => commands::why::run(&args),
+        args::Command::Graph(args) => commands::graph::run(&args),
+        args::Command::Verify(args) => commands::verify::run(&args),
+        args::Command::Gc(args) => commands::gc::run(&args),
+        args::Command::Doctor(args) => commands::doctor::run(&args),
         args::Command::Watch(args) => commands::watch::run(&args),
         #[cfg(feature = "preview")]
         args::Command::Preview(args) => commands::preview::run(&args),
@@ -47,6 +56,15 @@ fn main() -> ExitCode {
             return ExitCode::from(INPUT_IS_WRONG);
         }
         eprintln!("kiln: {error:#}");
+        if is_disk_full(&error) {
+            eprintln!("  help: `kiln gc --max-size 1GiB` frees what the cache does not need; nothing published is lost");
+        }
         ExitCode::from(TOOL_FAILED)
+    })
+}
+
+fn is_disk_full(error: &anyhow::Error) -> bool {
+    error.chain().filter_map(|cause| cause.downcast_ref::<std::io::Error>()).any(|cause| {
+        matches!(cause.kind(), std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded)
     })
 }

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::bail;
+use anyhow::{Context as _, bail};
+use kiln_build::{Engine, Store};
 
 /// The store: `KILN_CACHE`, or `kiln` in the user's cache folder.
 pub(crate) fn cache_folder() -> anyhow::Result<PathBuf> {
@@ -23,16 +24,62 @@ pub(crate) fn jobs(asked: Option<usize>) -> usize {
     asked.unwrap_or_else(cores).max(1)
 }
 
+/// The store of this user.
+pub(crate) fn open_store() -> anyhow::Result<Store> {
+    let cache = cache_folder()?;
+    let store = Store::open(&cache).context("opening the cache")?;
+    if store.is_read_only() {
+        eprintln!(
+            "warning: the cache {} cannot be written; it is read, and nothing new is kept",
+            cache.display()
+        );
+    }
+    Ok(store)
+}
+
+/// The engine of the project in `dir`.
+pub(crate) fn open_engine(dir: &Path) -> anyhow::Result<Engine> {
+    let folder = project_folder(dir)?;
+    Engine::open(&folder, open_store()?).context("opening the project")
+}
+
+/// What the cache may hold besides what is published: `KILN_CACHE_MAX`, else 16 GiB.
+pub(crate) fn cache_bytes_max() -> anyhow::Result<u64> {
+    let Some(text) = std::env::var_os("KILN_CACHE_MAX").filter(|value| !value.is_empty()) else {
+        return Ok(16 << 30);
+    };
+    let bytes = text.to_str().and_then(kiln_project::parse_bytes);
+    bytes.ok_or_else(|| {
+        WrongInput(format!("KILN_CACHE_MAX is {text:?}, which is no size; write it as 20GiB")).into()
+    })
+}
+
+/// What actions may take together: as asked, else three quarters of what is free.
+pub(crate) fn memory_bytes(asked: Option<u64>) -> u64 {
+    /// Where the system does not tell.
+    const USUAL: u64 = 4 << 30;
+    asked.unwrap_or_else(|| free_memory_bytes().map_or(USUAL, |free| free / 4 * 3))
+}
+
+/// Free memory, within the limit of this process's control group.
+fn free_memory_bytes() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    let free = line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024;
+    let limit = std::fs::read_to_string("/sys/fs/cgroup/memory.max").ok();
+    let limit = limit.and_then(|limit| limit.trim().parse::<u64>().ok()).unwrap_or(u64::MAX);
+    Some(free.min(limit))
+}
+
 /// The socket of the project in `dir`.
 #[cfg(feature = "preview")]
 pub(crate) fn socket_of(dir: &Path) -> anyhow::Result<PathBuf> {
-    use anyhow::Context as _;
     kiln_link::socket_path(&project_folder(dir)?).context("finding the project's socket")
 }
 
 /// What was asked for cannot be done: the request is wrong, not the tool.
 #[derive(Debug)]
-pub(crate) struct WrongInput(String);
+pub(crate) struct WrongInput(pub(crate) String);
 
 impl std::fmt::Display for WrongInput {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

@@ -61,7 +61,7 @@ pub(crate) fn work_lines(work: &Work) -> Vec<String> {
 }
 
 /// Levels of a map are one line together.
-fn group_label(name: &str) -> String {
+pub(crate) fn group_label(name: &str) -> String {
     match name.split_once(" mip ") {
         Some((map, _)) => map.to_owned(),
         None => name.to_owned(),

@@ -16,6 +16,7 @@ use kiln_link::{Client, ClientEvent, FrameReport, Revision};
 
 use crate::args::DemoArgs;
 use crate::commands::init;
+use crate::out::say;
 use crate::{INPUT_IS_WRONG, place, report, sheet};
 
 mod edits;
@@ -38,11 +39,11 @@ pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
         );
         return Ok(ExitCode::from(INPUT_IS_WRONG));
     }
-    println!("Kiln demo in {}\n", args.dir.display());
+    say!("Kiln demo in {}\n", args.dir.display());
     let files = init::write_sample(&args.dir, &args.sample)?;
-    kiln_build::write_atomically(&args.dir.join(MARKER), b"made by `kiln demo`\n")?;
+    kiln_build::write_atomically(&kiln_build::Disk, &args.dir.join(MARKER), b"made by `kiln demo`\n")?;
     let bytes = files.iter().map(|(_, bytes)| bytes).sum();
-    println!("wrote a sample project: {}, {}", report::count(files.len(), "file"), report::size(bytes));
+    say!("wrote a sample project: {}, {}", report::count(files.len(), "file"), report::size(bytes));
 
     let mut demo = Demo::start(args)?;
     demo.first_build()?;
@@ -73,11 +74,12 @@ struct Demo {
 impl Demo {
     fn start(args: &DemoArgs) -> anyhow::Result<Demo> {
         let eyes = Eyes::open(args.size);
-        println!("{}\n", eyes.describe());
+        say!("{}\n", eyes.describe());
         let options = DaemonOptions {
             folder: place::project_folder(&args.dir)?,
             cache: place::cache_folder()?,
             jobs: place::jobs(None),
+            memory_bytes: place::memory_bytes(None),
             write_outputs: true,
         };
         let daemon = Daemon::start(&options).context("starting the daemon")?;
@@ -105,7 +107,7 @@ impl Demo {
     }
 
     fn first_build(&mut self) -> anyhow::Result<()> {
-        println!("0. the first bake");
+        say!("0. the first bake");
         let (revision, received) = self.next_revision()?;
         self.show(0, "first", &revision, received, None)?;
         for env in revision.table.targets.keys().filter_map(|name| name.strip_suffix("/skybox")) {
@@ -114,24 +116,24 @@ impl Demo {
                 self.save(&format!("artefacts-{env}.png"), &png)?;
             }
         }
-        println!();
+        say!();
         Ok(())
     }
 
     fn perform(&mut self, index: usize, edit: &Edit) -> anyhow::Result<()> {
-        println!("{index}. {}  ({})", edit.title, edit.file);
+        say!("{index}. {}  ({})", edit.title, edit.file);
         let path = self.dir.join(edit.file);
         let old = std::fs::read(&path).with_context(|| format!("reading {}", path.display()))?;
         let new = (edit.change)(&old)?;
         let saved = unix_ms();
-        kiln_build::write_atomically(&path, &new)?;
+        kiln_build::write_atomically(&kiln_build::Disk, &path, &new)?;
         let (revision, received) = self.next_revision()?;
         if has_errors(&revision.table.diagnostics) != edit.breaks {
             report::print_diagnostics(&revision.table.diagnostics, true);
             bail!("this edit should {}break the project", if edit.breaks { "" } else { "not " });
         }
         self.show(index, edit.name, &revision, received, Some(saved))?;
-        println!();
+        say!();
         Ok(())
     }
 
@@ -157,8 +159,8 @@ impl Demo {
         saved: Option<f64>,
     ) -> anyhow::Result<()> {
         let work = &revision.table.work;
-        report::work_lines(work).iter().for_each(|line| println!("   {line}"));
-        println!("   {} reused", report::count(work.reused, "action"));
+        report::work_lines(work).iter().for_each(|line| say!("   {line}"));
+        say!("   {} reused", report::count(work.reused, "action"));
         report::print_diagnostics(&revision.table.diagnostics, index == 0);
         let Some(seen) = self.eyes.look(revision)? else { return Ok(()) };
         let drawn = FrameReport {
@@ -168,20 +170,20 @@ impl Demo {
             drawn_unix_ms: seen.drawn_unix_ms,
         };
         if let Some(saved) = saved {
-            println!("   {}", stages(saved, revision, &drawn));
+            say!("   {}", stages(saved, revision, &drawn));
         }
         self.client.report_frame(drawn);
         let file = format!("{index}-{name}.png");
         if seen.is_unchanged {
-            println!("   the picture is what it was: the last good shader still draws");
+            say!("   the picture is what it was: the last good shader still draws");
         }
         self.save(&file, &seen.png)
     }
 
     fn save(&mut self, name: &str, png: &[u8]) -> anyhow::Result<()> {
         let path = self.frames.join(name);
-        kiln_build::write_atomically(&path, png)?;
-        println!("   {}", path.display());
+        kiln_build::write_atomically(&kiln_build::Disk, &path, png)?;
+        say!("   {}", path.display());
         self.written.push(path);
         Ok(())
     }
@@ -194,7 +196,7 @@ impl Demo {
         let window = std::process::Command::new(program).arg("preview").arg(&self.dir).spawn();
         match window {
             Ok(window) => {
-                println!("A window opens: watch the edits arrive there too.\n");
+                say!("A window opens: watch the edits arrive there too.\n");
                 Some(window)
             }
             Err(error) => {
@@ -205,15 +207,13 @@ impl Demo {
     }
 
     fn finish(mut self, window: Option<Child>) -> anyhow::Result<ExitCode> {
-        println!("{} in {}", report::count(self.written.len(), "picture"), self.frames.display());
+        say!("{} in {}", report::count(self.written.len(), "picture"), self.frames.display());
         let dir = self.dir.display();
         if let Some(mut window) = window {
-            println!(
-                "\nThe project stays live until you close the window: edit the files in {dir} and watch."
-            );
+            say!("\nThe project stays live until you close the window: edit the files in {dir} and watch.");
             window.wait().context("waiting for the window")?;
         } else {
-            println!(
+            say!(
                 "\nGo on by yourself:\n  kiln watch {dir}\n  kiln preview {dir}   (in a second terminal; --headless without a display)"
             );
         }

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use anyhow::Context as _;
 
 use crate::args::{InitArgs, SampleArgs};
+use crate::out::say;
 use crate::{INPUT_IS_WRONG, report};
 
 pub(crate) fn run(args: &InitArgs) -> anyhow::Result<ExitCode> {
@@ -16,10 +17,10 @@ pub(crate) fn run(args: &InitArgs) -> anyhow::Result<ExitCode> {
     }
     let files = write_sample(&args.dir, &args.sample)?;
     for (path, bytes) in &files {
-        println!("{:>10}  {path}", report::size(*bytes));
+        say!("{:>10}  {path}", report::size(*bytes));
     }
     let dir = args.dir.display();
-    println!(
+    say!(
         "\nNext:\n  kiln watch {dir}      bake, then follow every edit\n  kiln preview {dir}    look at it (in a second terminal)"
     );
     Ok(ExitCode::SUCCESS)
@@ -30,7 +31,8 @@ pub(crate) fn write_sample(dir: &Path, args: &SampleArgs) -> anyhow::Result<Vec<
     let files = kiln_sample::files(&options(args));
     let mut written = Vec::new();
     for (path, bytes) in files {
-        kiln_build::write_atomically(&dir.join(&path), &bytes).context("writing the sample project")?;
+        kiln_build::write_atomically(&kiln_build::Disk, &dir.join(&path), &bytes)
+            .context("writing the sample project")?;
         written.push((path, bytes.len() as u64));
     }
     Ok(written)

@@ -2,7 +2,13 @@
 
 pub(crate) mod bake;
 pub(crate) mod demo;
+pub(crate) mod doctor;
+pub(crate) mod gc;
+pub(crate) mod graph;
 pub(crate) mod init;
+pub(crate) mod plan;
 #[cfg(feature = "preview")]
 pub(crate) mod preview;
+pub(crate) mod verify;
 pub(crate) mod watch;
+pub(crate) mod why;

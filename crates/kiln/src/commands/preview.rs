@@ -10,6 +10,7 @@ use kiln_preview::HeadlessViewer;
 use kiln_preview::{HeadlessOptions, Selection, View, WindowOptions, run_headless, run_window};
 
 use crate::args::PreviewArgs;
+use crate::out::say;
 use crate::{INPUT_IS_WRONG, place, report};
 
 /// Width and height of the window when it opens.
@@ -62,19 +63,14 @@ fn headless(
         timeout: Duration::from_secs(args.timeout_s),
     })?;
     if args.json {
-        println!("{}", serde_json::to_string_pretty(&done)?);
+        say!("{}", serde_json::to_string_pretty(&done)?);
         return Ok(ExitCode::SUCCESS);
     }
     report::print_diagnostics(&done.diagnostics, false);
-    done.notes.iter().for_each(|note| println!("note: {note}"));
-    println!(
-        "revision {} on {}: prepared in {}",
-        done.revision,
-        done.adapter,
-        report::duration(done.prepare_ms)
-    );
+    done.notes.iter().for_each(|note| say!("note: {note}"));
+    say!("revision {} on {}: prepared in {}", done.revision, done.adapter, report::duration(done.prepare_ms));
     for (file, ms) in done.files.iter().zip(&done.frame_ms) {
-        println!("{}  ({})", file.display(), report::duration(*ms));
+        say!("{}  ({})", file.display(), report::duration(*ms));
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -94,8 +90,8 @@ fn follow(
     let client = Client::connect(socket, "preview, following");
     while let Ok(event) = client.events().recv() {
         match event {
-            ClientEvent::Connected { project } => println!("connected to {project}"),
-            ClientEvent::Disconnected { reason } => println!("waiting: {reason}"),
+            ClientEvent::Connected { project } => say!("connected to {project}"),
+            ClientEvent::Disconnected { reason } => say!("waiting: {reason}"),
             ClientEvent::Progress { .. } => {}
             ClientEvent::Revision(revision) => {
                 let received_unix_ms = unix_ms();
@@ -107,7 +103,7 @@ fn follow(
                 report::print_diagnostics(&applied.diagnostics, false);
                 let path = args.out.join(format!("revision_{revision:04}.png"));
                 viewer.render()?.save(&path).with_context(|| format!("writing {}", path.display()))?;
-                println!("{}", path.display());
+                say!("{}", path.display());
             }
         }
     }

@@ -10,6 +10,7 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
 use crate::args::WatchArgs;
+use crate::out::say;
 use crate::{INPUT_IS_WRONG, place, report};
 
 pub(crate) fn run(args: &WatchArgs) -> anyhow::Result<ExitCode> {
@@ -17,6 +18,7 @@ pub(crate) fn run(args: &WatchArgs) -> anyhow::Result<ExitCode> {
         folder: place::project_folder(&args.build.dir)?,
         cache: place::cache_folder()?,
         jobs: place::jobs(args.build.jobs),
+        memory_bytes: place::memory_bytes(args.build.memory),
         write_outputs: !args.no_output,
     };
     let daemon = match Daemon::start(&options) {
@@ -28,8 +30,8 @@ pub(crate) fn run(args: &WatchArgs) -> anyhow::Result<ExitCode> {
     };
     stop_on_signals(daemon.stop_handle())?;
     if args.build.json {
-        println!("{}", json!({"event": "listening", "socket": daemon.socket()}));
-        daemon.run(&mut |notice| println!("{}", to_json(&notice)));
+        say!("{}", json!({"event": "listening", "socket": daemon.socket()}));
+        daemon.run(&mut |notice| say!("{}", to_json(&notice)));
     } else {
         eprintln!("watching {}", options.folder.display());
         eprintln!("look at it with `kiln preview {}`; Ctrl-C ends\n", args.build.dir.display());
@@ -61,14 +63,14 @@ impl Screen {
     fn show(&mut self, notice: &Notice) {
         match notice {
             Notice::Building { files } if files.is_empty() => {}
-            Notice::Building { files } => println!("{} changed", files.join(", ")),
-            Notice::Unchanged { .. } => println!("  nothing that anything uses is different"),
+            Notice::Building { files } => say!("{} changed", files.join(", ")),
+            Notice::Unchanged { .. } => say!("  nothing that anything uses is different"),
             Notice::Published(table) => {
                 self.noticed_unix_ms = table.work.noticed_unix_ms;
                 self.published_unix_ms = table.work.published_unix_ms;
-                report::work_lines(&table.work).iter().for_each(|line| println!("  {line}"));
+                report::work_lines(&table.work).iter().for_each(|line| say!("  {line}"));
                 report::print_diagnostics(&table.diagnostics, table.number == 1);
-                println!("  {}", report::revision_line(table));
+                say!("  {}", report::revision_line(table));
             }
             Notice::Failed(reason) => eprintln!("  the tool failed: {reason}; what was published stays"),
             Notice::Client(event) => self.show_client(event),
@@ -77,12 +79,12 @@ impl Screen {
 
     fn show_client(&self, event: &ServerEvent) {
         match event {
-            ServerEvent::Connected { client, name } => println!("client {client} ({name}) connected"),
-            ServerEvent::Gone { client, reason } => println!("client {client} left: {reason}"),
+            ServerEvent::Connected { client, name } => say!("client {client} ({name}) connected"),
+            ServerEvent::Gone { client, reason } => say!("client {client} left: {reason}"),
             ServerEvent::Frame { client, report } => {
                 let since =
                     if self.noticed_unix_ms > 0.0 { self.noticed_unix_ms } else { self.published_unix_ms };
-                println!(
+                say!(
                     "  client {client} shows revision {} {} after {}",
                     report.revision,
                     report::duration(report.drawn_unix_ms - since),

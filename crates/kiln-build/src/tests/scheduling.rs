@@ -1,0 +1,133 @@
+//! When actions run: memory, failures, cancellation.
+
+use std::sync::Barrier;
+
+use super::*;
+
+/// `count` actions that each need `need_bytes` and tell `observe` how many are at work.
+fn observed(count: usize, need_bytes: u64, observe: &Arc<AtomicUsize>, gate: Option<&Arc<Barrier>>) -> Graph {
+    let mut graph = Graph::default();
+    let at_work = Arc::new(AtomicUsize::new(0));
+    for index in 0..count {
+        let (observe, at_work, gate) = (observe.clone(), at_work.clone(), gate.cloned());
+        let step = action("step", json!({"index": index}), vec![], &["x"], move |_| {
+            observe.fetch_max(at_work.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
+            if let Some(gate) = &gate {
+                gate.wait();
+            }
+            at_work.fetch_sub(1, Ordering::SeqCst);
+            Ok(made("x", vec![0]))
+        });
+        graph.add(Action { name: format!("step {index}"), memory: Arc::new(move |_| need_bytes), ..step });
+    }
+    graph
+}
+
+#[test]
+fn actions_that_together_exceed_the_memory_run_one_after_another() {
+    let most = Arc::new(AtomicUsize::new(0));
+    let graph = observed(8, 600, &most, None);
+    let cancel = AtomicBool::new(false);
+    let place = Place::new();
+    place.engine().run(&graph, &RunOptions { memory_bytes: 1000, ..options(4, &cancel, &|_| {}) }).unwrap();
+    assert_eq!(most.load(Ordering::SeqCst), 1);
+}
+
+#[test]
+fn actions_that_fit_together_run_together() {
+    let most = Arc::new(AtomicUsize::new(0));
+    // The barrier opens only when two are at work.
+    let graph = observed(8, 500, &most, Some(&Arc::new(Barrier::new(2))));
+    let cancel = AtomicBool::new(false);
+    let place = Place::new();
+    place.engine().run(&graph, &RunOptions { memory_bytes: 1000, ..options(2, &cancel, &|_| {}) }).unwrap();
+    assert_eq!(most.load(Ordering::SeqCst), 2);
+}
+
+#[test]
+fn action_larger_than_the_memory_runs_alone() {
+    let most = Arc::new(AtomicUsize::new(0));
+    let graph = observed(4, 5000, &most, None);
+    let cancel = AtomicBool::new(false);
+    let place = Place::new();
+    let report = place
+        .engine()
+        .run(&graph, &RunOptions { memory_bytes: 1000, ..options(4, &cancel, &|_| {}) })
+        .unwrap();
+    assert!(report.is_complete());
+    assert_eq!(most.load(Ordering::SeqCst), 1);
+}
+
+/// One that fails, one that could run, and one that is in the store when `warm`.
+fn fails_first() -> Graph {
+    let mut graph = Graph::default();
+    graph.add(action("known", json!({}), vec![], &["x"], |_| Ok(made("x", "x"))));
+    graph.add(action("fails", json!({}), vec![], &["x"], |_| {
+        let diagnostics = vec![Diagnostic::error("no")];
+        Ok(ActionOutput { diagnostics, ..ActionOutput::default() })
+    }));
+    let other = graph.add(action("other", json!({}), vec![], &["x"], |_| Ok(made("x", "y"))));
+    let input = Input::Output { action: other, output: "x".into() };
+    graph.add(action("reader", json!({}), vec![input], &["x"], |_| Ok(made("x", "z"))));
+    graph
+}
+
+#[test]
+fn first_failure_stops_new_work_and_keep_going_does_not() {
+    let statuses = |keep_going: bool| {
+        let place = Place::new();
+        let cancel = AtomicBool::new(false);
+        let options = RunOptions { keep_going, ..options(1, &cancel, &|_| {}) };
+        let report = place.engine().run(&fails_first(), &options).unwrap();
+        let name = |outcome: &Outcome| match outcome.status {
+            Status::NotRun => "not run",
+            _ if outcome.failed() => "failed",
+            _ => "made",
+        };
+        report.outcomes.iter().map(name).collect::<Vec<_>>()
+    };
+    assert_eq!(statuses(true), ["made", "failed", "made", "made"]);
+    assert_eq!(statuses(false), ["made", "failed", "not run", "not run"]);
+}
+
+#[test]
+fn action_in_flight_ends_when_cancelled_and_nothing_of_it_is_kept() {
+    let place = Place::new();
+    let mut graph = Graph::default();
+    graph.add(action("endless", json!({}), vec![], &["x"], |inputs| {
+        loop {
+            inputs.check_cancelled()?;
+            std::thread::yield_now();
+        }
+    }));
+    let cancel = AtomicBool::new(false);
+    let cancel_when_started = |progress: Progress| {
+        if matches!(progress, Progress::Started { .. }) {
+            cancel.store(true, Ordering::SeqCst);
+        }
+    };
+    let report = place.engine().run(&graph, &options(2, &cancel, &cancel_when_started)).unwrap();
+    assert_eq!(report.outcomes[0].status, Status::NotRun);
+    assert!(place.files("v2/actions").is_empty());
+}
+
+#[test]
+fn processes_that_race_on_one_key_leave_one_result() {
+    let place = Place::new();
+    place.write("a.txt", "kiln");
+    let barrier = Barrier::new(4);
+    std::thread::scope(|scope| {
+        for _ in 0..4 {
+            scope.spawn(|| {
+                let engine = place.engine();
+                let graph = two_steps(&engine);
+                barrier.wait();
+                assert!(run(&engine, &graph, 2).outcomes.iter().all(Outcome::succeeded));
+                engine.save_memory().unwrap();
+            });
+        }
+    });
+    assert_eq!(place.blobs().len(), 2);
+    assert_eq!(place.files("v2/actions").len(), 2);
+    assert!(place.run(1).1.is_empty());
+}
