@@ -6,7 +6,7 @@ use crate::harness::{Project, actions_with, text};
 fn said_after(break_it: impl FnOnce(&Project)) -> (Project, String) {
     let project = Project::sample();
     break_it(&project);
-    let output = project.run(&["bake", "DIR"]);
+    let output = project.run(&["bake", "DIR", "--keep-going"]);
     assert_eq!(output.status.code(), Some(1), "{}{}", text(&output.stdout), text(&output.stderr));
     (project, text(&output.stderr))
 }
@@ -27,7 +27,7 @@ fn assert_rest_is_built(project: &Project, files: &[&str]) {
 fn missing_environment_is_named() {
     let (project, said) =
         said_after(|project| std::fs::remove_file(project.path("environments/sky.hdr")).unwrap());
-    assert_one_error(&said, &["not found", "environments/sky.hdr", "[env.sky]"]);
+    assert_one_error(&said, &["not found", "environments/sky.hdr", "`source` in kiln.toml"]);
     assert_rest_is_built(&project, &["env/studio/specular.ktx2", "scene/balls.glb"]);
     assert!(!project.path("baked/env/sky/specular.ktx2").exists());
 }

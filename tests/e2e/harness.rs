@@ -64,9 +64,9 @@ impl Project {
         self.command(arguments).output().unwrap()
     }
 
-    /// `kiln bake --json`: its exit code and report.
+    /// `kiln bake --keep-going --json`: its exit code and report.
     pub fn bake(&self) -> (i32, Value) {
-        let output = self.run(&["bake", "DIR", "--json"]);
+        let output = self.run(&["bake", "DIR", "--keep-going", "--json"]);
         let report = serde_json::from_slice(&output.stdout)
             .unwrap_or_else(|error| panic!("{error}: {}{}", text(&output.stdout), text(&output.stderr)));
         (output.status.code().unwrap(), report)

@@ -164,7 +164,7 @@ fn cache_deleted_under_a_running_daemon_is_made_anew_for_the_next_client() {
     let project = Project::sample();
     let watch = project.watch();
     let before = watch.client("first").revision();
-    std::fs::remove_dir_all(project.beside("cache/v1/cas")).unwrap();
+    std::fs::remove_dir_all(project.beside("cache/v2/cas")).unwrap();
     let again = watch.client("second").revision();
     assert_eq!(again.table.targets, before.table.targets);
 }

@@ -9,6 +9,7 @@ mod bake;
 mod ci;
 mod corpus;
 mod demo;
+mod faults;
 #[cfg(feature = "preview")]
 mod golden;
 mod harness;

@@ -1,5 +1,6 @@
 //! Store, sources and memory of one project together.
 
+use std::borrow::Cow;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
@@ -48,10 +49,10 @@ pub struct Scan {
 
 /// What a project published last, and whose it is.
 #[derive(Serialize, Deserialize)]
-pub(crate) struct Published {
+pub(crate) struct Published<'a> {
     pub(crate) host: String,
     pub(crate) folder: String,
-    pub(crate) targets: Targets,
+    pub(crate) targets: Cow<'a, Targets>,
 }
 
 /// The eyes of a running scan: notes every source that is looked at.
@@ -122,7 +123,7 @@ impl Engine {
             return Ok(targets.clone());
         }
         let found: Option<Published> = self.store.project_document(&self.project, PUBLISHED_FILE)?;
-        let mut targets = found.map(|found| found.targets).unwrap_or_default();
+        let mut targets = found.map(|found| found.targets.into_owned()).unwrap_or_default();
         targets.retain(|_, target| {
             target.parts.iter().all(|part| self.store.contains(&part.digest, part.bytes))
         });
@@ -137,7 +138,7 @@ impl Engine {
         let published = Published {
             host: crate::collect::host(),
             folder: self.folder.to_string_lossy().into_owned(),
-            targets: (**targets).clone(),
+            targets: Cow::Borrowed(&**targets),
         };
         self.store.put_project_document(&self.project, PUBLISHED_FILE, &published)?;
         *lock(&self.published) = Some(targets.clone());

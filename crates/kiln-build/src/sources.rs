@@ -126,18 +126,10 @@ impl SourceTree {
         seen
     }
 
-    /// The bytes at `path`; `None` if there is no readable file.
+    /// The bytes at `path` now; `None` if there is no readable file. Either way the path counts as looked at.
     pub fn read(&self, path: &str) -> Option<Arc<[u8]>> {
-        let Ok(bytes) = read_file(&self.root.join(path)) else {
-            // Seen as missing or unreadable, so that its appearance counts as a change.
-            self.state(path);
-            return None;
-        };
-        if !lock(&self.seen).contains_key(path) {
-            let state = SourceState::Present(self.hash(&bytes));
-            lock(&self.seen).insert(path.to_owned(), Seen { state, bytes: bytes.len() as u64 });
-        }
-        Some(bytes.into())
+        self.state(path);
+        read_file(&self.root.join(path)).ok().map(Arc::from)
     }
 
     /// Every path looked at since the last refresh, missing ones too: what a watcher must watch.
@@ -157,11 +149,6 @@ impl SourceTree {
     /// How many files were read to learn their digest, and how many bytes they had together.
     pub fn hashed(&self) -> (usize, u64) {
         (self.hashed_files.load(Ordering::Relaxed), self.hashed_bytes.load(Ordering::Relaxed))
-    }
-
-    fn hash(&self, bytes: &[u8]) -> Digest {
-        self.count_hashed(bytes.len() as u64);
-        Digest::of(bytes)
     }
 
     fn count_hashed(&self, bytes: u64) {

@@ -17,27 +17,24 @@ const BAKE_RUNS: usize = 5;
 /// Prints p50 and p95 of save-to-frame, the no-op bake and the bake of one panorama.
 pub(crate) fn run(edits: usize) -> Result<(), String> {
     step("build", &mut cargo(&["build", "--release"]))?;
-    let folder = target_dir().join("bench");
-    // Left over from an earlier bench, or not there.
-    let _ = std::fs::remove_dir_all(&folder);
-    let bench = Bench { folder };
-    std::fs::create_dir_all(bench.folder.join("runtime")).map_err(|error| error.to_string())?;
+    let bench = Bench::new("bench")?;
     println!("\n{} cores; every figure is wall-clock time on this machine as busy as it is now", cores());
     bench.one_panorama()?;
     bench.no_op()?;
     bench.edits(edits)
 }
 
-fn cores() -> usize {
+pub(crate) fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-struct Bench {
-    folder: PathBuf,
+/// A folder of its own for what a bench makes.
+pub(crate) struct Bench {
+    pub(crate) folder: PathBuf,
 }
 
 /// A process that ends with this value.
-struct Running(Child);
+pub(crate) struct Running(pub(crate) Child);
 
 impl Drop for Running {
     fn drop(&mut self) {
@@ -48,7 +45,15 @@ impl Drop for Running {
 }
 
 impl Bench {
-    fn kiln(&self, cache: &str) -> Command {
+    pub(crate) fn new(name: &str) -> Result<Bench, String> {
+        let folder = target_dir().join(name);
+        // Left over from an earlier bench, or not there.
+        let _ = std::fs::remove_dir_all(&folder);
+        std::fs::create_dir_all(folder.join("runtime")).map_err(|error| error.to_string())?;
+        Ok(Bench { folder })
+    }
+
+    pub(crate) fn kiln(&self, cache: &str) -> Command {
         let mut command = Command::new(kiln());
         command
             .env("KILN_CACHE", self.folder.join(cache))
@@ -173,7 +178,7 @@ fn with_comment(hdr: &[u8], index: usize) -> Vec<u8> {
     bytes
 }
 
-fn lines_of(child: &mut Child) -> Result<Receiver<String>, String> {
+pub(crate) fn lines_of(child: &mut Child) -> Result<Receiver<String>, String> {
     let output = child.stdout.take().ok_or("the daemon has no output")?;
     let (sender, lines) = channel();
     std::thread::spawn(move || {
@@ -200,10 +205,10 @@ fn wait_for_frame(lines: &Receiver<String>) -> Result<f64, String> {
     }
 }
 
-fn print_times(what: &str, times: &mut [f64]) {
+pub(crate) fn print_times(what: &str, times: &mut [f64]) {
     times.sort_by(f64::total_cmp);
     let at = |share: f64| times[((times.len() - 1) as f64 * share).round() as usize];
-    println!("{what}: p50 {:.0} ms, p95 {:.0} ms, n = {}", at(0.5), at(0.95), times.len());
+    println!("{what}: p50 {:.1} ms, p95 {:.1} ms, n = {}", at(0.5), at(0.95), times.len());
 }
 
 /// Builds with and without the preview, each in a folder of its own, and compares cost and size.

@@ -37,7 +37,7 @@ pub(crate) fn run(out: &str) -> Result<(), String> {
     let project = out.join("project");
     write_project(Path::new(&corpus), &project)?;
     let start = Instant::now();
-    step("bake", Command::new(kiln()).arg("bake").arg(&project))?;
+    step("bake", Command::new(kiln()).arg("bake").arg("--keep-going").arg(&project))?;
     println!("{:.1} s for all panoramas and scenes", start.elapsed().as_secs_f64());
     let daemon =
         Command::new(kiln()).arg("watch").arg(&project).arg("--no-output").stdout(Stdio::null()).spawn();

@@ -12,6 +12,7 @@
 use std::process::ExitCode;
 
 mod bench;
+mod bench_cache;
 mod corpus;
 mod packages;
 mod shell;
@@ -20,6 +21,8 @@ mod test;
 const HELP: &str = "\
 cargo xtask test [--no-install]   install what tests need where that is allowed, then run all tests, clippy, fmt and docs
 cargo xtask bench [EDITS]         save-to-frame of shader and HDR edits, no-op bake, bake of one panorama
+cargo xtask bench cache           no-op bakes, planning, overhead and hashing on generated projects of up to 10 000 files
+cargo xtask faults [COUNT]        kill COUNT processes at random moments and flip COUNT bits (default 1000)
 cargo xtask corpus [OUT]          bake and render the files of $KILN_CORPUS into OUT (default target/corpus)
 cargo xtask size                  build with and without the preview and compare time and size
 ";
@@ -31,6 +34,9 @@ fn main() -> ExitCode {
         ["test"] => test::run(true),
         ["test", "--no-install"] => test::run(false),
         ["bench"] => bench::run(20),
+        ["bench", "cache"] => bench_cache::run(),
+        ["faults"] => test::faults("1000"),
+        ["faults", count] => test::faults(count),
         ["bench", edits] => match edits.parse() {
             Ok(edits) => bench::run(edits),
             Err(_) => Err(format!("`{edits}` is no number of edits")),

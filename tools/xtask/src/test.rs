@@ -45,3 +45,9 @@ pub(crate) fn run(may_install: bool) -> Result<(), String> {
     let mut docs = cargo(&["doc", "--release", "--workspace", "--no-deps"]);
     step("docs", docs.env("RUSTDOCFLAGS", "-D warnings"))
 }
+
+/// The tests that kill processes and spoil files, with a count of their own, and their report.
+pub(crate) fn faults(count: &str) -> Result<(), String> {
+    let mut tests = cargo(&["test", "--release", "--workspace", "--", "faults", "--nocapture"]);
+    step("faults", tests.env("KILN_FAULTS", count))
+}
