@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
-use kiln_bake::{Accuracy, Analysis, AnalysisRequest, EncodedLevel, TexelFormat};
+use kiln_bake::{
+    Accuracy, Analysis, AnalysisRequest, BakeError, Cancel, Cancelled, EncodedLevel, TexelFormat,
+};
 use kiln_build::{Action, ActionId, ActionOutput, Engine, Error, Input, Inputs};
 use kiln_diagnostic::Diagnostic;
-use kiln_image::{Cube, Decoded, Limits, Panorama, TexelPolicy, check_texels};
+use kiln_image::{Cube, DecodeError, Decoded, Limits, Panorama, TexelError, TexelPolicy, check_texels};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
@@ -111,7 +113,7 @@ impl Steps<'_> {
             json!({"texels": policy_name(policy), "unreadable": unreadable, "env": name, "source": path});
         self.action("", ("decode", 1), params, vec![input], move |inputs| {
             Ok(match inputs.bytes(0)? {
-                Some(bytes) => decode(&bytes, &path, policy),
+                Some(bytes) => decode(&bytes, &path, policy, Cancel::NEVER)?,
                 None => {
                     let section = format!("env.{name}");
                     failure(no_content("environment", &path, unreadable.as_deref(), &section))
@@ -126,9 +128,10 @@ impl Steps<'_> {
         let request = AnalysisRequest { alpha_min: roughness * roughness, error: self.env.error };
         let params = json!({"alpha_min": request.alpha_min, "error": request.error});
         self.action("", ("analyse", 1), params, vec![output(decode, "panorama")], move |inputs| {
-            let analysis = kiln_bake::analyse(&panorama(inputs, 0)?, &request);
+            let cancel = Cancel::NEVER;
+            let analysis = kiln_bake::analyse(&panorama(inputs, 0)?, &request, cancel).map_err(ended)?;
             let meta = json!({"detail": {"band_limit": analysis.band_limit(), "mean": analysis.mean()}});
-            Ok(success("analysis", analysis.to_bytes(), meta))
+            Ok(success("analysis", analysis.to_bytes(cancel).map_err(ended)?, meta))
         })
     }
 
@@ -140,12 +143,14 @@ impl Steps<'_> {
         // Its note names the file.
         params["source"] = json!(env.source);
         self.action("", ("skybox", 1), params, inputs, move |inputs| {
+            let cancel = Cancel::NEVER;
             let panorama = panorama(inputs, 0)?;
             let report = report(inputs, 1)?;
             let face_size = skybox_face_size(report.width);
-            let levels = kiln_bake::skybox(&panorama, face_size);
+            let levels = kiln_bake::skybox(&panorama, face_size, cancel).map_err(ended)?;
             let encode = Encode::new(&env, &report);
-            let encoded: Vec<EncodedLevel> = levels.iter().map(|cube| encode.level(cube)).collect();
+            let encoded: Vec<EncodedLevel> =
+                levels.iter().map(|cube| encode.level(cube, cancel)).collect::<Result<_, _>>()?;
             let mut shared = encode.facts();
             shared["size"] = json!(face_size);
             shared["levels"] = json!(levels.len());
@@ -153,7 +158,10 @@ impl Steps<'_> {
             let meta = json!({"shared": shared, "detail": {"rounding_rms": rounding}});
             let mirror = match levels.iter().position(|level| level.face_size == env.size) {
                 Some(level) => encoded[level].bytes.clone(),
-                None => encode.level(&kiln_bake::skybox(&panorama, env.size)[0]).bytes,
+                None => {
+                    let levels = kiln_bake::skybox(&panorama, env.size, cancel).map_err(ended)?;
+                    encode.level(&levels[0], cancel)?.bytes
+                }
             };
             let named =
                 encoded.into_iter().enumerate().map(|(index, level)| (format!("mip{index}"), level.bytes));
@@ -168,15 +176,18 @@ impl Steps<'_> {
         params["size"] = json!(env.irradiance_size);
         let inputs = vec![output(analyse, "analysis"), output(decode, "report")];
         self.action("", ("irradiance", 1), params, inputs, move |inputs| {
-            let map = kiln_bake::irradiance(&analysis(inputs, 0)?, env.irradiance_size);
-            Ok(Encode::new(&env, &report(inputs, 1)?).output(LEVEL, &map.cube, accuracy_facts(&map.accuracy)))
+            let cancel = Cancel::NEVER;
+            let analysis = analysis(inputs, 0, cancel)?;
+            let map = kiln_bake::irradiance(&analysis, env.irradiance_size, cancel).map_err(ended)?;
+            let detail = accuracy_facts(&map.accuracy);
+            Encode::new(&env, &report(inputs, 1)?).output(LEVEL, &map.cube, detail, cancel)
         })
     }
 
     fn sh(&self, analyse: ActionId) -> Action {
         let params = json!({"order": SH_ORDER});
         self.action("", ("sh", 1), params, vec![output(analyse, "analysis")], |inputs| {
-            let analysis = analysis(inputs, 0)?;
+            let analysis = analysis(inputs, 0, Cancel::NEVER)?;
             let mut text = serde_json::to_vec_pretty(&json!({
                 "convention": SH_CONVENTION,
                 "order": SH_ORDER,
@@ -198,27 +209,34 @@ impl Steps<'_> {
         params["alpha"] = json!(roughness * roughness);
         let inputs = vec![output(analyse, "analysis"), output(decode, "report")];
         self.action(&format!("/specular mip {level}"), ("prefilter", 1), params, inputs, move |inputs| {
-            let map = kiln_bake::specular_level(&analysis(inputs, 0)?, roughness * roughness, face_size);
+            let cancel = Cancel::NEVER;
+            let analysis = analysis(inputs, 0, cancel)?;
+            let alpha = roughness * roughness;
+            let map = kiln_bake::specular_level(&analysis, alpha, face_size, cancel).map_err(ended)?;
             let mut detail = accuracy_facts(&map.accuracy);
             detail["roughness"] = json!(roughness);
-            Ok(Encode::new(&env, &report(inputs, 1)?).output(LEVEL, &map.cube, detail))
+            Encode::new(&env, &report(inputs, 1)?).output(LEVEL, &map.cube, detail, cancel)
         })
     }
 }
 
-fn decode(bytes: &[u8], path: &str, policy: TexelPolicy) -> ActionOutput {
-    let decoded = match kiln_image::decode(bytes, &Limits::default()) {
+fn decode(bytes: &[u8], path: &str, policy: TexelPolicy, cancel: Cancel) -> Result<ActionOutput, Error> {
+    let fail =
+        |error: &dyn std::fmt::Display| Ok(failure(Diagnostic::error(error.to_string()).in_file(path)));
+    let decoded = match kiln_image::decode(bytes, &Limits::default(), cancel) {
         Ok(decoded) => decoded,
+        Err(DecodeError::Cancelled(cancelled)) => return Err(ended(cancelled)),
         Err(error) => {
             let help = "export the panorama again as .hdr or .exr";
-            return failure(Diagnostic::error(error.to_string()).in_file(path).with_help(help));
+            return Ok(failure(Diagnostic::error(error.to_string()).in_file(path).with_help(help)));
         }
     };
     let Decoded { mut image, format, notes } = decoded;
     let mut diagnostics: Vec<Diagnostic> =
         notes.into_iter().map(|note| Diagnostic::note(note).in_file(path)).collect();
-    match policy.apply(&mut image) {
-        Err(error) => return failure(Diagnostic::error(error.to_string()).in_file(path)),
+    match policy.apply(&mut image, cancel) {
+        Err(TexelError::Cancelled(cancelled)) => return Err(ended(cancelled)),
+        Err(error) => return fail(&error),
         Ok(repair) if repair.non_finite + repair.negative > 0 => {
             let message = format!(
                 "repaired {} non-finite and {} negative values; relative flux moved {:.2e}",
@@ -228,16 +246,16 @@ fn decode(bytes: &[u8], path: &str, policy: TexelPolicy) -> ActionOutput {
         }
         Ok(_) => {}
     }
-    let max = check_texels(&image).max;
+    let max = check_texels(&image, cancel).map_err(ended)?.max;
     let (width, height) = (image.width, image.height);
     let panorama = match Panorama::new(image) {
         Ok(panorama) => panorama,
-        Err(error) => return failure(Diagnostic::error(error.to_string()).in_file(path)),
+        Err(error) => return fail(&error),
     };
     let report = serde_json::to_vec(&Report { width, height, max }).unwrap_or_default();
     let meta = json!({"detail": {"format": format, "width": width, "height": height, "max": max}});
     let outputs = vec![("panorama".to_owned(), encode_panorama(&panorama)), ("report".to_owned(), report)];
-    ActionOutput { outputs, meta, diagnostics }
+    Ok(ActionOutput { outputs, meta, diagnostics })
 }
 
 /// How the maps of one environment are stored: all with the same format and scale.
@@ -258,18 +276,24 @@ impl Encode {
         Encode { format, scale_log2, max: report.max }
     }
 
-    fn level(&self, cube: &Cube) -> EncodedLevel {
-        kiln_bake::encode_level(cube, self.format, self.scale_log2)
+    fn level(&self, cube: &Cube, cancel: Cancel) -> Result<EncodedLevel, Error> {
+        kiln_bake::encode_level(cube, self.format, self.scale_log2, cancel).map_err(ended)
     }
 
     fn facts(&self) -> Value {
         json!({"format": format_name(self.format), "scale_log2": self.scale_log2})
     }
 
-    fn output(&self, name: &str, cube: &Cube, mut detail: Value) -> ActionOutput {
-        let level = self.level(cube);
+    fn output(
+        &self,
+        name: &str,
+        cube: &Cube,
+        mut detail: Value,
+        cancel: Cancel,
+    ) -> Result<ActionOutput, Error> {
+        let level = self.level(cube, cancel)?;
         detail["rounding_rms"] = json!(level.rounding_rms);
-        success(name, level.bytes, json!({"shared": self.facts(), "detail": detail}))
+        Ok(success(name, level.bytes, json!({"shared": self.facts(), "detail": detail})))
     }
 
     /// Said once per environment, with the skybox.
@@ -318,12 +342,20 @@ fn panorama(inputs: &Inputs, index: usize) -> Result<Panorama, Error> {
     decode_panorama(&inputs.required(index)?)
 }
 
-fn analysis(inputs: &Inputs, index: usize) -> Result<Analysis, Error> {
-    Analysis::from_bytes(&inputs.required(index)?).map_err(|error| damaged("an analysis", &error))
+fn analysis(inputs: &Inputs, index: usize, cancel: Cancel) -> Result<Analysis, Error> {
+    Analysis::from_bytes(&inputs.required(index)?, cancel).map_err(|error| match error {
+        BakeError::Cancelled(cancelled) => ended(cancelled),
+        error => damaged("an analysis", &error),
+    })
 }
 
 fn report(inputs: &Inputs, index: usize) -> Result<Report, Error> {
     serde_json::from_slice(&inputs.required(index)?).map_err(|error| damaged("a report", &error))
+}
+
+/// What a step says that was ended early.
+pub(crate) fn ended(cancelled: Cancelled) -> Error {
+    Error::Action { action: "bake".to_owned(), reason: cancelled.to_string() }
 }
 
 fn damaged(what: &str, error: &dyn std::fmt::Display) -> Error {

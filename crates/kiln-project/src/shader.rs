@@ -3,10 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use kiln_bake::Cancel;
 use kiln_build::{Action, ActionOutput, Engine, Error, Input};
 use serde_json::{Value, json};
 
-use crate::environment::{failure, success};
+use crate::environment::{ended, failure, success};
 use crate::plan::{PartSpec, Planner, no_content, rank, unreadable};
 use crate::{Role, ShaderConfig};
 
@@ -117,7 +118,7 @@ pub(crate) fn plan_brdf_table(planner: &mut Planner) {
         inputs: Vec::new(),
         rank: rank::SCENE,
         perform: Arc::new(|_| {
-            let texels = kiln_bake::dfg_table(BRDF_TABLE_SIZE);
+            let texels = kiln_bake::dfg_table(BRDF_TABLE_SIZE, Cancel::NEVER).map_err(ended)?;
             let bytes = texels.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
             Ok(success("texels", bytes, Value::Null))
         }),
