@@ -116,7 +116,8 @@ impl Analysis {
     }
 }
 
-fn byte_count(band_limit: usize, bright_count: usize) -> usize {
+/// Bytes of an analysis of that many degrees and bright texels.
+pub(crate) const fn byte_count(band_limit: usize, bright_count: usize) -> usize {
     let coefficients = coefficient_count(band_limit) + coefficient_count(LOW_BAND_LIMIT);
     HEADER_BYTES + bright_count * 28 + coefficients * 48
 }

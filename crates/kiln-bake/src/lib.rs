@@ -11,7 +11,8 @@
 //! maps hold E/π; `f64` inside, `f32` in results. Panoramas are expected to be finite and not negative:
 //! `kiln_image` checks and repairs texels. Equal inputs give equal bytes for any number of threads.
 //!
-//! Every step takes a [`Cancel`] last: soon after it is set the step returns [`Cancelled`].
+//! Every step takes a [`Cancel`] last: soon after it is set the step returns [`Cancelled`]. [`memory`] says what the
+//! steps need.
 //!
 //! Not here: image files and containers (`kiln-image`), when to bake what (`kiln-daemon`), sampled estimators
 //! (`kiln-sample`).
@@ -20,6 +21,7 @@ mod analysis;
 mod bright;
 mod bytes;
 mod encode;
+pub mod memory;
 mod patch;
 mod prefilter;
 mod reference;

@@ -13,7 +13,7 @@
 
 use crate::cancel::{Bulk, Cancel, Cancelled};
 use crate::fft::{C64, Plan, bin, cis, even_fft_length, sinc};
-use crate::harmonics::{Coefficient, Harmonics};
+use crate::harmonics::{Coefficient, Harmonics, coefficient_count};
 use crate::legendre::{BATCH, LANES, Order, RingBlock, add_products};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -56,6 +56,18 @@ pub fn analyse(
     Harmonics::from_orders(band_limit, &mut orders, cancel)
 }
 
+/// Memory that [`analyse`] takes at most, its result included, its input and some kilobytes a thread not.
+pub fn analyse_bytes(width: usize, height: usize, band_limit: usize) -> usize {
+    let spectra = height * spectrum_length(width, band_limit);
+    // Once as orders, once as the result.
+    (spectra + 2 * coefficient_count(band_limit)) * size_of::<Coefficient>()
+}
+
+/// Frequencies a row's spectrum keeps.
+fn spectrum_length(width: usize, band_limit: usize) -> usize {
+    band_limit.min(width / 2) + 1
+}
+
 /// Where a real row's spectrum of period `width` holds frequency m, and whether conjugated.
 fn alias(m: usize, width: usize) -> (usize, bool) {
     let frequency = m % width;
@@ -70,7 +82,7 @@ fn row_spectra(
     band_limit: usize,
     cancel: Cancel,
 ) -> Result<Bulk<Vec<Coefficient>>, Cancelled> {
-    let stride = band_limit.min(width / 2) + 1;
+    let stride = spectrum_length(width, band_limit);
     let fft = Plan::new(width).forward;
     // Plain zeros come from the system as they are touched, in the loop; zeros of another type would be written here,
     // all 200 MB of them.

@@ -93,6 +93,6 @@ impl Harmonics {
 }
 
 /// Number of (l, m) with 0 ≤ m ≤ l ≤ `band_limit`.
-pub fn coefficient_count(band_limit: usize) -> usize {
+pub const fn coefficient_count(band_limit: usize) -> usize {
     (band_limit + 1) * (band_limit + 2) / 2
 }

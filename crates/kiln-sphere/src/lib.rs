@@ -32,7 +32,7 @@ mod testing;
 mod tests;
 mod world;
 
-pub use analysis::analyse;
+pub use analysis::{analyse, analyse_bytes};
 pub use cancel::{Bulk, Cancel, Cancelled};
 
 pub use direction::{
@@ -40,5 +40,5 @@ pub use direction::{
 };
 pub use harmonics::{Harmonics, coefficient_count};
 pub use kernel::{Kernel, ggx_kernel_at, kernel_charlie, kernel_ggx, kernel_lambert};
-pub use synthesis::{evaluate, synthesise_cube};
+pub use synthesis::{evaluate, synthesise_cube, synthesise_cube_bytes};
 pub use world::{real_harmonics, world_coefficients};

@@ -45,6 +45,21 @@ pub fn synthesise_cube(
     Ok(rgb)
 }
 
+/// Memory that [`synthesise_cube`] takes at most, its result included, its input and some kilobytes a thread not.
+pub fn synthesise_cube_bytes(band_limit: usize, face_size: usize) -> usize {
+    let period = grid_period(band_limit);
+    let line_count = period / 2 + WIDTH;
+    let orders = (band_limit + 1) * line_count * size_of::<[C64; 3]>();
+    let grid = line_count * (period + WIDTH) * size_of::<[f64; 3]>();
+    orders + grid + 6 * face_size * face_size * size_of::<[f64; 3]>()
+}
+
+/// Grid points per full circle for degrees up to `band_limit`.
+fn grid_period(band_limit: usize) -> usize {
+    let least = libm::ceil((2 * band_limit + 2) as f64 * OVERSAMPLING) as usize;
+    even_fft_length(least.max(2 * WIDTH))
+}
+
 /// The function with coefficients κ_l a_lm in one direction, summed term by term: slow and exact up to rounding.
 pub fn evaluate(harmonics: &Harmonics, kappa: &[f64], direction: [f64; 3]) -> [f64; 3] {
     let band_limit = usable_band_limit(harmonics, kappa);
@@ -93,8 +108,7 @@ const MARGIN: usize = WIDTH / 2 - 1;
 impl Grid {
     fn new(harmonics: &Harmonics, kappa: &[f64], cancel: Cancel) -> Result<Self, Cancelled> {
         let band_limit = usable_band_limit(harmonics, kappa);
-        let least = libm::ceil((2 * band_limit + 2) as f64 * OVERSAMPLING) as usize;
-        let period = even_fft_length(least.max(2 * WIDTH));
+        let period = grid_period(band_limit);
         let window = Window::new();
         let deconvolution = window.deconvolution(band_limit, period, cancel)?;
         let columns = Columns::new(harmonics, kappa, period, &deconvolution);

@@ -1,5 +1,6 @@
 //! Tests of the crate, by topic.
 
+mod cancel;
 mod colour;
 mod corpus;
 mod corpus_orientation;
