@@ -36,17 +36,18 @@ pub fn skybox(width: usize, height: usize, face_size: usize) -> usize {
     with_slack(2 * panorama(width, height) + faces + levels)
 }
 
-/// [`crate::specular_level`] from an analysis of `analysis_bytes` (at most [`ANALYSIS_BYTES_MAX`]).
-pub fn specular_level(analysis_bytes: usize, alpha: f64, face_size: usize) -> usize {
+/// [`crate::specular_level`] from an analysis of `analysis_bytes` (at most [`ANALYSIS_BYTES_MAX`]), made for `error`
+/// ([`crate::AnalysisRequest`]).
+pub fn specular_level(analysis_bytes: usize, error: f64, alpha: f64, face_size: usize) -> usize {
     let texels = 6 * face_size * face_size;
-    let band_limit = band_limit(analysis_bytes).min(band_limit_needed(alpha));
+    let band_limit = band_limit(analysis_bytes).min(band_limit_needed(alpha, error));
     let map = texels * (size_of::<[f32; 3]>() + STORED_TEXEL);
     with_slack(2 * analysis_bytes + synthesise_cube_bytes(band_limit, face_size) + map)
 }
 
-/// [`crate::irradiance`] from an analysis of `analysis_bytes` (at most [`ANALYSIS_BYTES_MAX`]).
-pub fn irradiance(analysis_bytes: usize, face_size: usize) -> usize {
-    specular_level(analysis_bytes, 1.0, face_size)
+/// [`crate::irradiance`], from the same.
+pub fn irradiance(analysis_bytes: usize, error: f64, face_size: usize) -> usize {
+    specular_level(analysis_bytes, error, 1.0, face_size)
 }
 
 /// The larger of the two texel formats.
@@ -66,12 +67,16 @@ fn band_limit(analysis_bytes: usize) -> usize {
     (2 * analysis_bytes / size_of::<[f64; 6]>()).isqrt().min(BAND_LIMIT_MAX)
 }
 
-/// Degrees a map uses at most, whatever is known: they end where |κ_l| falls below a quarter of the relative error asked
-/// for, by the environment's contrast.
+/// Contrast up to which the estimates hold: RMS over mean of what the transform sees, after the brightest texels left.
+const CONTRAST_MAX: f64 = 30.0;
+
+/// Degrees a map uses at most, whatever is known.
 ///
-/// The lobe makes |κ_l| ≈ x K_1(x) with x = 2αl, 3e-9 at x = 22. The horizon adds a part of order l^(−5/2), below Lambert's
-/// 1.6 l^(−5/2), 5e-8 at l = 1023. So errors down to 2e-5 are covered for an RMS of 100 times the mean.
-fn band_limit_needed(alpha: f64) -> usize {
+/// The lobe makes |κ_l| ≈ x K_1(x) with x = 2αl, 3e-9 at x = 22. The horizon adds no more than Lambert's 1.6 l^(−5/2). A map
+/// takes all degrees L if by them alone its error can exceed a quarter of `error`: with Σ_{l > L} κ_l² (2l + 1)/4π ≈ 0.14/L³
+/// (see `Truncation::choose`) that ends at L = 1.9 √(contrast/error).
+fn band_limit_needed(alpha: f64, error: f64) -> usize {
     let lobe = 11.0 / crate::prefilter::usable_alpha(alpha);
-    (lobe as usize).max(1023)
+    let horizon = 1.9 * (CONTRAST_MAX / error).sqrt();
+    lobe.max(horizon) as usize
 }

@@ -106,11 +106,14 @@ fn stored(map: &Panorama) -> Vec<u8> {
 #[test]
 #[expect(clippy::print_stdout, reason = "the figures are what one wants to read")]
 fn estimates_cover_the_counted_peak_and_are_no_more_than_four_times_it() {
-    for (width, height) in [(512, 256), (2048, 1024)] {
-        let request = AnalysisRequest { alpha_min: 1.0 / 500.0, error: 1e-5 };
-        let (map, never, face_size) = (panorama(width, height), Cancel::NEVER, width / 4);
+    // The small one with the most degrees there are, the large one with fewer, for the time it takes.
+    for (width, height, alpha, band_limit_min) in
+        [(512, 256, 0.002, BAND_LIMIT_MAX), (2048, 1024, 0.004, 1200)]
+    {
+        let request = AnalysisRequest { alpha_min: alpha, error: 1e-4 };
+        let (map, never, face_size) = (panorama(width, height), Cancel::NEVER, width / 8);
         let analysis = analyse(&map, &request, never).expect(WANTED);
-        assert_eq!(analysis.band_limit(), BAND_LIMIT_MAX, "the most demanding case");
+        assert!(analysis.band_limit() >= band_limit_min, "{}", analysis.band_limit());
         let (file, blob) = (hdr::encode(map.image()), analysis.to_bytes(never).expect(WANTED));
         assert!(blob.len() <= memory::ANALYSIS_BYTES_MAX);
         drop(analysis);
@@ -144,22 +147,25 @@ fn estimates_cover_the_counted_peak_and_are_no_more_than_four_times_it() {
             let encoded: Vec<_> = levels.iter().map(encode).collect();
             (input, map, levels, encoded)
         };
-        let alpha = request.alpha_min;
         let steps = [
             ("decode", memory::decode(file.len()), peak_of(decode)),
             ("analyse", memory::analyse(width, height), peak_of(analyse)),
             ("skybox", memory::skybox(width, height, face_size), peak_of(skybox)),
             (
                 "specular level",
-                memory::specular_level(blob.len(), alpha, face_size),
+                memory::specular_level(blob.len(), request.error, alpha, face_size),
                 peak_of(|| prefilter(Some(alpha))),
             ),
             (
                 "rough level",
-                memory::specular_level(blob.len(), 0.25, face_size),
+                memory::specular_level(blob.len(), request.error, 0.25, face_size),
                 peak_of(|| prefilter(Some(0.25))),
             ),
-            ("irradiance", memory::irradiance(blob.len(), face_size), peak_of(|| prefilter(None))),
+            (
+                "irradiance",
+                memory::irradiance(blob.len(), request.error, face_size),
+                peak_of(|| prefilter(None)),
+            ),
         ];
         for (name, estimate, peak) in steps {
             println!("{width} x {height} {name}: peak {peak}, estimate {estimate}");
