@@ -3,7 +3,7 @@
 use crate::bright::{BrightTexel, take_brightest};
 use crate::patch::Patch;
 use kiln_image::Panorama;
-use kiln_sphere::{Harmonics, kernel_ggx};
+use kiln_sphere::{Bulk, Cancel, Cancelled, Harmonics, kernel_ggx};
 use std::f64::consts::PI;
 
 /// Highest band limit [`analyse`] chooses: GGX of α = 1/256 to 1e-4. Beyond it memory, not time, is the limit
@@ -45,16 +45,27 @@ pub struct Analysis {
 /// The band limit follows the error asked for: with V the variance of the dim part over the sphere, the smallest L
 /// with max_{l > L} |κ_l| √V ≤ error/2 · mean, κ the spectrum of `alpha_min`; at most [`BAND_LIMIT_MAX`]. What is
 /// reached is stated by each map ([`crate::Accuracy`]).
-pub fn analyse(panorama: &Panorama, request: &AnalysisRequest) -> Analysis {
+///
+/// # Errors
+/// [`Cancelled`] within a row's or a block of rings' work.
+pub fn analyse(
+    panorama: &Panorama,
+    request: &AnalysisRequest,
+    cancel: Cancel,
+) -> Result<Analysis, Cancelled> {
     let (width, height) = (panorama.width(), panorama.height());
-    let low = kiln_sphere::analyse(width, height, panorama.rgb(), LOW_BAND_LIMIT);
-    let mut rgb = panorama.rgb().to_vec();
-    let bright = take_brightest(&mut rgb, low.mean(), BRIGHT_MAX);
-    let dim_energy = energy(width, height, &rgb);
+    let low = kiln_sphere::analyse(width, height, panorama.rgb(), LOW_BAND_LIMIT, cancel)?;
+    let mut rgb = Bulk::new(Vec::with_capacity(panorama.rgb().len()));
+    for row in panorama.rgb().chunks_exact(width * 3) {
+        cancel.check()?;
+        rgb.extend_from_slice(row);
+    }
+    let bright = take_brightest(width, &mut rgb, low.mean(), BRIGHT_MAX, cancel)?;
+    let dim_energy = energy(width, height, &rgb, cancel)?;
     let variance = variance_of_rest(low.mean(), dim_energy, width, height, &bright);
-    let band_limit = choose_band_limit(request, low.mean(), variance);
-    let dim = kiln_sphere::analyse(width, height, &rgb, band_limit);
-    Analysis {
+    let band_limit = choose_band_limit(request, low.mean(), variance, cancel)?;
+    let dim = kiln_sphere::analyse(width, height, &rgb, band_limit, cancel)?;
+    Ok(Analysis {
         width,
         height,
         error: request.error,
@@ -62,8 +73,8 @@ pub fn analyse(panorama: &Panorama, request: &AnalysisRequest) -> Analysis {
         dim_energy,
         bright,
         low,
-        range: range(panorama.rgb()),
-    }
+        range: range(width, panorama.rgb(), cancel)?,
+    })
 }
 
 impl Analysis {
@@ -100,28 +111,41 @@ fn square(rgb: [f64; 3]) -> f64 {
     rgb.iter().map(|value| value * value).sum()
 }
 
-pub(crate) fn choose_band_limit(request: &AnalysisRequest, mean: [f64; 3], variance: f64) -> usize {
+pub(crate) fn choose_band_limit(
+    request: &AnalysisRequest,
+    mean: [f64; 3],
+    variance: f64,
+    cancel: Cancel,
+) -> Result<usize, Cancelled> {
     if variance <= 0.0 {
-        return LOW_BAND_LIMIT;
+        return Ok(LOW_BAND_LIMIT);
     }
     let allowed = 0.5 * request.error * (square(mean) / variance).sqrt();
-    let kappa = kernel_ggx(crate::prefilter::usable_alpha(request.alpha_min), BAND_LIMIT_MAX).kappa;
+    let alpha = crate::prefilter::usable_alpha(request.alpha_min);
+    let kappa = kernel_ggx(alpha, BAND_LIMIT_MAX, cancel)?.kappa;
     let last_needed = kappa.iter().rposition(|k| k.abs() > allowed || allowed.is_nan()).unwrap_or(0);
-    last_needed.max(LOW_BAND_LIMIT)
+    Ok(last_needed.max(LOW_BAND_LIMIT))
 }
 
 /// ∫ |f|² dω of constant patches, summed over the channels.
-fn energy(width: usize, height: usize, rgb: &[f32]) -> f64 {
+fn energy(width: usize, height: usize, rgb: &[f32], cancel: Cancel) -> Result<f64, Cancelled> {
     let row_energy = |(row, texels): (usize, &[f32])| {
+        cancel.check()?;
         let solid_angle_sr = Patch::of_texel(width, height, row * width).solid_angle_sr();
-        solid_angle_sr * texels.iter().map(|&value| f64::from(value) * f64::from(value)).sum::<f64>()
+        Ok(solid_angle_sr * texels.iter().map(|&value| f64::from(value) * f64::from(value)).sum::<f64>())
     };
     rgb.chunks_exact(width * 3).enumerate().map(row_energy).sum()
 }
 
-fn range(rgb: &[f32]) -> [[f64; 2]; 3] {
-    std::array::from_fn(|channel| {
-        let values = rgb.iter().skip(channel).step_by(3).map(|&value| f64::from(value));
-        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
-    })
+fn range(width: usize, rgb: &[f32], cancel: Cancel) -> Result<[[f64; 2]; 3], Cancelled> {
+    let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
+    for row in rgb.chunks_exact(width * 3) {
+        cancel.check()?;
+        for texel in row.chunks_exact(3) {
+            for ([low, high], &value) in range.iter_mut().zip(texel) {
+                (*low, *high) = (low.min(value.into()), high.max(value.into()));
+            }
+        }
+    }
+    Ok(range)
 }

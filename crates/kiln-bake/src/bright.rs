@@ -1,7 +1,7 @@
 //! The brightest texels leave the transform through their own door: each is convolved with the exact kernel.
 
 use crate::patch::{Node, Patch, distance2, is_below_horizon, is_on_horizon, lobe_scale2};
-use kiln_sphere::ggx_kernel_at;
+use kiln_sphere::{Cancel, Cancelled, ggx_kernel_at};
 
 /// A texel's excess over what the transform keeps of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,21 +16,19 @@ const BRIGHTNESS_MIN: f64 = 16.0;
 
 /// Takes the up to `count` brightest texels (by their largest channel) down to the brightest that stays,
 /// keeping their hue; `rgb` is left with the rest.
-pub(crate) fn take_brightest(rgb: &mut [f32], mean: [f64; 3], count: usize) -> Vec<BrightTexel> {
+pub(crate) fn take_brightest(
+    width: usize,
+    rgb: &mut [f32],
+    mean: [f64; 3],
+    count: usize,
+    cancel: Cancel,
+) -> Result<Vec<BrightTexel>, Cancelled> {
     let limit = BRIGHTNESS_MIN * mean.iter().fold(0.0, |a: f64, &b| a.max(b));
-    let mut brightness: Vec<(f32, usize)> = rgb
-        .chunks_exact(3)
-        .map(|texel| texel.iter().fold(0.0, |a: f32, &b| a.max(b)))
-        .enumerate()
-        .map(|(index, value)| (value, index))
-        .collect();
-    let descending = |a: &(f32, usize), b: &(f32, usize)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
-    let kept = count.min(brightness.len() - 1);
-    brightness.select_nth_unstable_by(kept, descending);
-    let mut top: Vec<(f32, usize)> = brightness[..=kept].to_vec();
-    top.sort_unstable_by(descending);
+    let texel_count = rgb.len() / 3;
+    let kept = count.min(texel_count - 1);
+    let top = brightest(width, rgb, kept + 1, cancel)?;
     let taken = top[..kept].iter().take_while(|(value, _)| f64::from(*value) > limit).count();
-    let stays = if brightness.len() == 1 { 0.0 } else { top[taken].0 };
+    let stays = if texel_count == 1 { 0.0 } else { top[taken].0 };
     let take = |&(value, index): &(f32, usize)| {
         let texel = &mut rgb[3 * index..3 * index + 3];
         let excess = std::array::from_fn(|channel| {
@@ -42,7 +40,33 @@ pub(crate) fn take_brightest(rgb: &mut [f32], mean: [f64; 3], count: usize) -> V
     };
     let mut bright: Vec<BrightTexel> = top[..taken].iter().map(take).collect();
     bright.retain(|texel| texel.excess.iter().any(|&value| value > 0.0));
-    bright
+    Ok(bright)
+}
+
+/// The `count` brightest texels (value, index), brightest first, of equal ones the first.
+fn brightest(
+    width: usize,
+    rgb: &[f32],
+    count: usize,
+    cancel: Cancel,
+) -> Result<Vec<(f32, usize)>, Cancelled> {
+    let descending = |a: &(f32, usize), b: &(f32, usize)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
+    let mut top: Vec<(f32, usize)> = Vec::new();
+    // Row by row, since one selection from all texels could not be interrupted.
+    for (row, texels) in rgb.chunks(width * 3).enumerate() {
+        cancel.check()?;
+        let brightness = |texel: &[f32]| texel.iter().fold(0.0, |a: f32, &b| a.max(b));
+        let values = texels.chunks_exact(3).map(brightness).enumerate();
+        let values = values.map(|(column, value)| (value, row * width + column));
+        let least = top.get(count - 1).copied();
+        top.extend(values.filter(|value| least.is_none_or(|least| descending(value, &least).is_lt())));
+        if top.len() >= count {
+            top.select_nth_unstable_by(count - 1, descending);
+            top.truncate(count);
+        }
+    }
+    top.sort_unstable_by(descending);
+    Ok(top)
 }
 
 /// Bright texels with their quadrature rules.

@@ -6,10 +6,11 @@
 
 use crate::analysis::{Analysis, BAND_LIMIT_MAX, BRIGHT_MAX, LOW_BAND_LIMIT};
 use crate::bright::BrightTexel;
-use kiln_sphere::{Harmonics, coefficient_count};
+use kiln_sphere::{Bulk, Cancel, Cancelled, Harmonics, coefficient_count};
 use thiserror::Error;
 
 const MAGIC: [u8; 8] = *b"KILNSPH1";
+const HEADER_BYTES: usize = MAGIC.len() + 5 * 4 + 8 * 8;
 /// Panoramas wider than this are no panoramas.
 const SIDE_MAX: usize = 1 << 20;
 
@@ -45,12 +46,23 @@ pub enum BakeError {
         /// Which of the file's f64 values, from 0.
         index: usize,
     },
+    /// The analysis is not wanted any more; says nothing about the bytes.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
+
+/// Coefficients between two looks at a [`Cancel`]: a fraction of a millisecond's work.
+const CHECK_COEFFICIENTS: usize = 1 << 13;
 
 impl Analysis {
     /// The analysis as bytes; equal analyses give equal bytes.
-    pub fn to_bytes(&self) -> Vec<u8> {
-        let mut bytes = MAGIC.to_vec();
+    ///
+    /// # Errors
+    /// [`Cancelled`] within a millisecond.
+    pub fn to_bytes(&self, cancel: Cancel) -> Result<Vec<u8>, Cancelled> {
+        let mut result = Bulk::new(Vec::with_capacity(byte_count(self.band_limit(), self.bright.len())));
+        let bytes: &mut Vec<u8> = &mut result;
+        bytes.extend_from_slice(&MAGIC);
         let counts = [self.width, self.height, self.band_limit(), LOW_BAND_LIMIT, self.bright.len()];
         counts.iter().for_each(|&count| bytes.extend_from_slice(&(count as u32).to_le_bytes()));
         let mut push = |value: f64| bytes.extend_from_slice(&value.to_le_bytes());
@@ -62,29 +74,33 @@ impl Analysis {
             texel.excess.iter().for_each(|value| bytes.extend_from_slice(&value.to_le_bytes()));
         }
         for harmonics in [&self.low, &self.dim] {
-            for value in harmonics.coefficients().as_flattened() {
-                bytes.extend_from_slice(&value.to_le_bytes());
+            for coefficients in harmonics.coefficients().chunks(CHECK_COEFFICIENTS) {
+                cancel.check()?;
+                for value in coefficients.as_flattened() {
+                    bytes.extend_from_slice(&value.to_le_bytes());
+                }
             }
         }
-        bytes
+        Ok(result.into_inner())
     }
 
     /// Reads what [`Analysis::to_bytes`] wrote. Hostile bytes give an error: sizes are checked against the length
     /// before anything is allocated, and every number must be finite.
-    pub fn from_bytes(bytes: &[u8]) -> Result<Analysis, BakeError> {
+    ///
+    /// # Errors
+    /// [`BakeError`]; [`BakeError::Cancelled`] within a millisecond.
+    pub fn from_bytes(bytes: &[u8], cancel: Cancel) -> Result<Analysis, BakeError> {
         let mut reader =
             Reader { rest: bytes.strip_prefix(&MAGIC).ok_or(BakeError::NotAnAnalysis)?, f64_count: 0 };
-        let header_bytes = MAGIC.len() + 5 * 4 + 8 * 8;
-        if bytes.len() < header_bytes {
-            return Err(BakeError::Length { expected: header_bytes, actual: bytes.len() });
+        if bytes.len() < HEADER_BYTES {
+            return Err(BakeError::Length { expected: HEADER_BYTES, actual: bytes.len() });
         }
         let width = reader.count("width", 1, SIDE_MAX)?;
         let height = reader.count("height", 1, SIDE_MAX)?;
         let band_limit = reader.count("band limit", 0, BAND_LIMIT_MAX)?;
         reader.count("low band limit", LOW_BAND_LIMIT, LOW_BAND_LIMIT)?;
         let bright_count = reader.count("bright texel count", 0, BRIGHT_MAX)?;
-        let coefficients = coefficient_count(band_limit) + coefficient_count(LOW_BAND_LIMIT);
-        let expected = header_bytes + bright_count * 28 + coefficients * 48;
+        let expected = byte_count(band_limit, bright_count);
         if bytes.len() != expected {
             return Err(BakeError::Length { expected, actual: bytes.len() });
         }
@@ -94,10 +110,16 @@ impl Analysis {
             *value = reader.number()?;
         }
         let bright = (0..bright_count).map(|_| reader.bright(width * height)).collect::<Result<_, _>>()?;
-        let low = reader.harmonics(LOW_BAND_LIMIT)?;
-        let dim = reader.harmonics(band_limit)?;
+        let low = reader.harmonics(LOW_BAND_LIMIT, cancel)?;
+        let dim = reader.harmonics(band_limit, cancel)?;
         Ok(Analysis { width, height, error, dim, dim_energy, bright, low, range })
     }
+}
+
+/// Bytes of an analysis of that many degrees and bright texels.
+pub(crate) const fn byte_count(band_limit: usize, bright_count: usize) -> usize {
+    let coefficients = coefficient_count(band_limit) + coefficient_count(LOW_BAND_LIMIT);
+    HEADER_BYTES + bright_count * 28 + coefficients * 48
 }
 
 /// Reads fields off bytes whose length has been checked.
@@ -131,11 +153,14 @@ impl Reader<'_> {
         Ok(BrightTexel { index, excess: [self.number()?, self.number()?, self.number()?] })
     }
 
-    fn harmonics(&mut self, band_limit: usize) -> Result<Harmonics, BakeError> {
-        let mut coefficients = vec![[0.0; 6]; coefficient_count(band_limit)];
-        for value in coefficients.as_flattened_mut() {
-            *value = self.number()?;
+    fn harmonics(&mut self, band_limit: usize, cancel: Cancel) -> Result<Harmonics, BakeError> {
+        let mut coefficients = Bulk::new(vec![[0.0; 6]; coefficient_count(band_limit)]);
+        for coefficients in coefficients.chunks_mut(CHECK_COEFFICIENTS) {
+            cancel.check()?;
+            for value in coefficients.as_flattened_mut() {
+                *value = self.number()?;
+            }
         }
-        Ok(Harmonics::from_coefficients(band_limit, coefficients).expect("counted above"))
+        Ok(Harmonics::from_coefficients(band_limit, coefficients.into_inner()).expect("counted above"))
     }
 }

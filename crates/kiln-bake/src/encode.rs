@@ -2,6 +2,7 @@
 
 use half::f16;
 use kiln_image::Cube;
+use kiln_sphere::{Bulk, Cancel, Cancelled};
 
 /// How a texel is stored: four channels, little-endian, A = 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,21 +40,34 @@ pub fn scale_log2(max_value: f32) -> i32 {
 ///
 /// Values outside binary16's range saturate at ±65504, never Inf; `rounding_rms` counts that. Infinite input counts
 /// as out of range, NaN stays NaN.
-pub fn encode_level(cube: &Cube, format: TexelFormat, scale_log2: i32) -> EncodedLevel {
+///
+/// # Errors
+/// [`Cancelled`] within a row's work.
+pub fn encode_level(
+    cube: &Cube,
+    format: TexelFormat,
+    scale_log2: i32,
+    cancel: Cancel,
+) -> Result<EncodedLevel, Cancelled> {
     let scale = libm::exp2(-f64::from(scale_log2));
     let texel_bytes = if format == TexelFormat::Rgba16Float { 8 } else { 16 };
-    let mut bytes = Vec::with_capacity(cube.rgb.len() / 3 * texel_bytes);
+    let mut bytes = Bulk::new(Vec::with_capacity(cube.rgb.len() / 3 * texel_bytes));
     let (mut change2, mut size2) = (0.0, 0.0);
-    for texel in cube.rgb.chunks_exact(3) {
-        for &value in texel {
-            let wanted = f64::from(value) * scale;
-            let stored = push(&mut bytes, format, wanted);
-            change2 += (stored - wanted) * (stored - wanted);
-            size2 += wanted * wanted;
+    for line in cube.rgb.chunks(cube.face_size.max(1) * 3) {
+        cancel.check()?;
+        let bytes: &mut Vec<u8> = &mut bytes;
+        for texel in line.chunks_exact(3) {
+            for &value in texel {
+                let wanted = f64::from(value) * scale;
+                let stored = push(bytes, format, wanted);
+                change2 += (stored - wanted) * (stored - wanted);
+                size2 += wanted * wanted;
+            }
+            push(bytes, format, 1.0);
         }
-        push(&mut bytes, format, 1.0);
     }
-    EncodedLevel { bytes, rounding_rms: if size2 > 0.0 { (change2 / size2).sqrt() } else { 0.0 } }
+    let rounding_rms = if size2 > 0.0 { (change2 / size2).sqrt() } else { 0.0 };
+    Ok(EncodedLevel { bytes: bytes.into_inner(), rounding_rms })
 }
 
 /// Appends a channel; returns what a reader will see.

@@ -11,6 +11,9 @@
 //! maps hold E/π; `f64` inside, `f32` in results. Panoramas are expected to be finite and not negative:
 //! `kiln_image` checks and repairs texels. Equal inputs give equal bytes for any number of threads.
 //!
+//! Every step takes a [`Cancel`] last: soon after it is set the step returns [`Cancelled`]. [`memory`] says what the
+//! steps need.
+//!
 //! Not here: image files and containers (`kiln-image`), when to bake what (`kiln-daemon`), sampled estimators
 //! (`kiln-sample`).
 
@@ -18,6 +21,7 @@ mod analysis;
 mod bright;
 mod bytes;
 mod encode;
+pub mod memory;
 mod patch;
 mod prefilter;
 mod reference;
@@ -26,6 +30,8 @@ mod skybox;
 mod tables;
 #[cfg(test)]
 mod tests;
+
+pub use kiln_sphere::{Bulk, Cancel, Cancelled};
 
 pub use analysis::{Analysis, AnalysisRequest, BAND_LIMIT_MAX, BRIGHT_MAX, analyse};
 pub use bytes::BakeError;

@@ -5,7 +5,8 @@ use crate::bright::BrightSet;
 use kiln_image::Cube;
 use kiln_sphere::direction::cube_texel_centre;
 use kiln_sphere::{
-    Kernel, cube_direction, cube_texel_solid_angle_sr, kernel_ggx, kernel_lambert, synthesise_cube,
+    Bulk, Cancel, Cancelled, Kernel, cube_direction, cube_texel_solid_angle_sr, kernel_ggx, kernel_lambert,
+    synthesise_cube,
 };
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -39,53 +40,88 @@ pub struct Accuracy {
 ///
 /// `alpha` = perceptual roughness², brought into [[`ALPHA_MIN`], 1]; for roughness 0 use [`crate::skybox`].
 /// `face_size` ≥ 1. As many degrees are used as the analysis' error asks for at this α.
-pub fn specular_level(analysis: &Analysis, alpha: f64, face_size: usize) -> Prefiltered {
+///
+/// # Errors
+/// [`Cancelled`] within the work of a block of rings or a row of texels.
+pub fn specular_level(
+    analysis: &Analysis,
+    alpha: f64,
+    face_size: usize,
+    cancel: Cancel,
+) -> Result<Prefiltered, Cancelled> {
     let alpha = usable_alpha(alpha);
-    prefilter(analysis, &kernel_ggx(alpha, analysis.band_limit()), alpha, face_size)
+    prefilter(analysis, &kernel_ggx(alpha, analysis.band_limit(), cancel)?, alpha, face_size, cancel)
 }
 
 /// The environment's irradiance over π, E/π: convolved with max(cos θ, 0)/π, which is GGX of α = 1.
-pub fn irradiance(analysis: &Analysis, face_size: usize) -> Prefiltered {
-    prefilter(analysis, &kernel_lambert(analysis.band_limit()), 1.0, face_size)
+///
+/// # Errors
+/// [`Cancelled`] within the work of a block of rings or a row of texels.
+pub fn irradiance(analysis: &Analysis, face_size: usize, cancel: Cancel) -> Result<Prefiltered, Cancelled> {
+    prefilter(analysis, &kernel_lambert(analysis.band_limit()), 1.0, face_size, cancel)
 }
 
 pub(crate) fn usable_alpha(alpha: f64) -> f64 {
     if alpha >= ALPHA_MIN { alpha.min(1.0) } else { ALPHA_MIN }
 }
 
-fn prefilter(analysis: &Analysis, kernel: &Kernel, alpha: f64, face_size: usize) -> Prefiltered {
-    let truncation = Truncation::choose(analysis, kernel);
+fn prefilter(
+    analysis: &Analysis,
+    kernel: &Kernel,
+    alpha: f64,
+    face_size: usize,
+    cancel: Cancel,
+) -> Result<Prefiltered, Cancelled> {
+    let truncation = Truncation::choose(analysis, kernel, cancel)?;
     let kappa = &kernel.kappa[..=truncation.band_limit];
-    let mut rgb = synthesise_cube(&analysis.dim, kappa, face_size);
-    add_bright(analysis, alpha, libm::exp(-kernel.ln_norm), face_size, &mut rgb);
-    let clamped_flux = clamp(analysis, face_size, &mut rgb);
-    let largest = rgb.chunks_exact(3).map(norm).fold(0.0, f64::max);
-    let cube = Cube { face_size, rgb: rgb.iter().map(|&value| value as f32).collect() };
-    Prefiltered { cube, accuracy: truncation.accuracy(largest, clamped_flux) }
+    let mut values = synthesise_cube(&analysis.dim, kappa, face_size, cancel)?;
+    add_bright(analysis, alpha, libm::exp(-kernel.ln_norm), face_size, &mut values, cancel)?;
+    let clamped_flux = clamp(analysis, face_size, &mut values, cancel)?;
+    let mut largest = 0.0;
+    let mut rgb = Bulk::new(Vec::with_capacity(values.len()));
+    for line in values.chunks_exact(face_size * 3) {
+        cancel.check()?;
+        largest = line.chunks_exact(3).map(norm).fold(largest, f64::max);
+        rgb.extend(line.iter().map(|&value| value as f32));
+    }
+    let cube = Cube { face_size, rgb: rgb.into_inner() };
+    Ok(Prefiltered { cube, accuracy: truncation.accuracy(largest, clamped_flux) })
 }
 
 /// Adds the bright texels' share, Σ excess ∫_patch K dω / ∫ K dω.
-fn add_bright(analysis: &Analysis, alpha: f64, inverse_norm: f64, face_size: usize, rgb: &mut [f64]) {
+fn add_bright(
+    analysis: &Analysis,
+    alpha: f64,
+    inverse_norm: f64,
+    face_size: usize,
+    rgb: &mut [f64],
+    cancel: Cancel,
+) -> Result<(), Cancelled> {
     let bright = BrightSet::new(analysis.width, analysis.height, &analysis.bright);
     if bright.is_empty() {
-        return;
+        return Ok(());
     }
-    rgb.par_chunks_mut(face_size * 3).enumerate().for_each(|(line, texels)| {
+    rgb.par_chunks_mut(face_size * 3).enumerate().try_for_each(|(line, texels)| {
         let t = cube_texel_centre(face_size, line % face_size);
         for (x, texel) in texels.chunks_exact_mut(3).enumerate() {
+            cancel.check()?;
             let axis = cube_direction(line / face_size, cube_texel_centre(face_size, x), t);
             for (value, share) in texel.iter_mut().zip(bright.convolve_ggx(alpha, axis)) {
                 *value += share * inverse_norm;
             }
         }
-    });
+        Ok(())
+    })
 }
 
 /// Brings values into the environment's range; returns the flux moved relative to all flux.
-fn clamp(analysis: &Analysis, face_size: usize, rgb: &mut [f64]) -> f64 {
+fn clamp(analysis: &Analysis, face_size: usize, rgb: &mut [f64], cancel: Cancel) -> Result<f64, Cancelled> {
     let (mut moved, mut total) = (0.0, 0.0);
     for (index, texel) in rgb.chunks_exact_mut(3).enumerate() {
         let (x, y) = (index % face_size, index / face_size % face_size);
+        if x == 0 {
+            cancel.check()?;
+        }
         let (mut texel_moved, mut texel_total) = (0.0, 0.0);
         for (value, [low, high]) in texel.iter_mut().zip(analysis.range) {
             let inside = value.max(low).min(high);
@@ -97,7 +133,7 @@ fn clamp(analysis: &Analysis, face_size: usize, rgb: &mut [f64]) -> f64 {
         moved += solid_angle_sr * texel_moved;
         total += solid_angle_sr * texel_total;
     }
-    if total > 0.0 { moved / total } else { 0.0 }
+    Ok(if total > 0.0 { moved / total } else { 0.0 })
 }
 
 /// Relative error of evaluation apart from truncation: the window of the synthesis, the bright texels' rules (1e-7
@@ -119,10 +155,10 @@ struct Truncation {
 
 impl Truncation {
     /// The fewest degrees that leave a quarter of the error asked for.
-    fn choose(analysis: &Analysis, kernel: &Kernel) -> Self {
-        let energies = analysis.dim.band_energies();
+    fn choose(analysis: &Analysis, kernel: &Kernel, cancel: Cancel) -> Result<Self, Cancelled> {
+        let energies = analysis.dim.band_energies(cancel)?;
         let last = energies.len() - 1;
-        let map_energy = scaled_energy(&kernel.kappa, &analysis.low.band_energies());
+        let map_energy = scaled_energy(&kernel.kappa, &analysis.low.band_energies(cancel)?);
         // By Parseval what the known degrees do not hold is beyond them; rounding leaves 1e-13 of the whole.
         let unknown = (analysis.dim_energy - energies.iter().sum::<f64>()).max(1e-13 * analysis.dim_energy);
         let tail = kernel.energy_beyond(last);
@@ -141,7 +177,7 @@ impl Truncation {
             sup += kappa.abs() * ((2 * band_limit + 1) as f64 * band / (4.0 * PI)).sqrt();
             band_limit -= 1;
         }
-        Self { band_limit, energy, sup, map_energy, mean: norm(&analysis.mean()) }
+        Ok(Self { band_limit, energy, sup, map_energy, mean: norm(&analysis.mean()) })
     }
 
     /// `largest`: norm of the map's brightest texel, which evaluation errors are relative to.

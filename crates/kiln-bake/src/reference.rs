@@ -3,8 +3,8 @@
 use crate::patch::{Node, Patch, direction, distance2, ggx_at, is_below_horizon, is_on_horizon, lobe_scale2};
 use crate::prefilter::usable_alpha;
 use kiln_image::Panorama;
-use kiln_sphere::kernel_ggx;
 use kiln_sphere::quadrature::gauss_legendre;
+use kiln_sphere::{Cancel, kernel_ggx};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
@@ -16,7 +16,8 @@ use std::f64::consts::PI;
 pub fn reference_radiance(panorama: &Panorama, alpha: f64, axis: [f64; 3]) -> [f64; 3] {
     let alpha = usable_alpha(alpha);
     let (width, height) = (panorama.width(), panorama.height());
-    let inverse_norm = libm::exp(-kernel_ggx(alpha, 0).ln_norm);
+    let kernel = kernel_ggx(alpha, 0, Cancel::NEVER).expect("nobody cancels");
+    let inverse_norm = libm::exp(-kernel.ln_norm);
     let columns = Columns::new(width);
     let rows: Vec<[f64; 3]> = (0..height)
         .into_par_iter()

@@ -7,62 +7,83 @@
 
 use kiln_image::{Cube, Panorama};
 use kiln_sphere::quadrature::gauss_legendre;
-use kiln_sphere::{cube_direction, cube_texel_solid_angle_sr, panorama_uv};
+use kiln_sphere::{Bulk, Cancel, Cancelled, cube_direction, cube_texel_solid_angle_sr, panorama_uv};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// The panorama on cubes of `face_size` ≥ 1, half of it (rounded down), …, 1 texel along an edge.
 ///
 /// Each mip is the solid-angle weighted mean of the one before; after an odd size it is made from the panorama anew.
-pub fn skybox(panorama: &Panorama, face_size: usize) -> Vec<Cube> {
-    let mut levels = vec![resample(panorama, face_size)];
+///
+/// # Errors
+/// [`Cancelled`] within the work of a row, or of a column of a side face.
+pub fn skybox(panorama: &Panorama, face_size: usize, cancel: Cancel) -> Result<Vec<Cube>, Cancelled> {
+    let mut levels = Bulk::new(vec![resample(panorama, face_size, cancel)?]);
     while let Some(last) = levels.last().filter(|level| level.face_size > 1) {
         let size = last.face_size / 2;
-        let next = if last.face_size.is_multiple_of(2) { halve(last) } else { resample(panorama, size) };
+        let is_even = last.face_size.is_multiple_of(2);
+        let next = if is_even { halve(last, cancel)? } else { resample(panorama, size, cancel)? };
         levels.push(next);
     }
-    levels
+    Ok(levels.into_inner())
 }
 
-fn resample(panorama: &Panorama, face_size: usize) -> Cube {
+fn resample(panorama: &Panorama, face_size: usize, cancel: Cancel) -> Result<Cube, Cancelled> {
     let sampler = Sampler::new(panorama, face_size);
-    // Sums of (red, green, blue, 1) dω: side faces column by column, caps whole.
-    let sides: Vec<Vec<[f64; 4]>> = (0..4 * face_size)
-        .into_par_iter()
-        .map(|index| sampler.side_column([0, 1, 4, 5][index / face_size], index % face_size))
-        .collect();
-    let caps: Vec<Vec<[f64; 4]>> = [2, 3].into_par_iter().map(|face| sampler.cap(face)).collect();
-    let sum_at = |index: usize| {
-        let (face, y, x) =
-            (index / (face_size * face_size), index / face_size % face_size, index % face_size);
-        match face {
-            2 | 3 => caps[face - 2][y * face_size + x],
-            0 | 1 => sides[face * face_size + x][y],
-            _ => sides[(face - 2) * face_size + x][y],
-        }
+    // Side faces column by column, caps whole and still as sums.
+    let mut sides = Bulk::new(vec![Vec::new(); 4 * face_size]);
+    sides.par_iter_mut().enumerate().try_for_each(|(index, column)| {
+        let sums = sampler.side_column([0, 1, 4, 5][index / face_size], index % face_size, cancel)?;
+        *column = sums.into_iter().map(mean).collect();
+        Ok(())
+    })?;
+    let mut caps = Bulk::new([Vec::new(), Vec::new()]);
+    caps.par_iter_mut().enumerate().try_for_each(|(index, sums)| {
+        *sums = sampler.cap(2 + index, cancel)?;
+        Ok(())
+    })?;
+    let texel = |face: usize, y: usize, x: usize| match face {
+        2 | 3 => mean(caps[face - 2][y * face_size + x]),
+        0 | 1 => sides[face * face_size + x][y],
+        _ => sides[(face - 2) * face_size + x][y],
     };
-    let mean = |[r, g, b, total]: [f64; 4]| [r, g, b].map(|sum| (sum / total) as f32);
-    Cube { face_size, rgb: (0..6 * face_size * face_size).flat_map(|index| mean(sum_at(index))).collect() }
+    let mut rgb = Bulk::new(Vec::with_capacity(6 * face_size * face_size * 3));
+    for line in 0..6 * face_size {
+        cancel.check()?;
+        let (face, y) = (line / face_size, line % face_size);
+        rgb.extend((0..face_size).flat_map(|x| texel(face, y, x)));
+    }
+    Ok(Cube { face_size, rgb: rgb.into_inner() })
 }
 
-fn halve(cube: &Cube) -> Cube {
+/// Of the sums of (red, green, blue, 1) dω.
+fn mean([r, g, b, total]: [f64; 4]) -> [f32; 3] {
+    [r, g, b].map(|sum| (sum / total) as f32)
+}
+
+fn halve(cube: &Cube, cancel: Cancel) -> Result<Cube, Cancelled> {
     let size = cube.face_size / 2;
-    let mut rgb = Vec::with_capacity(6 * size * size * 3);
-    for index in 0..6 * size * size {
-        let (face, y, x) = (index / (size * size), index / size % size, index % size);
-        let (mut sum, mut total) = ([0.0; 3], 0.0);
-        for (dy, dx) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            let (x, y) = (2 * x + dx, 2 * y + dy);
-            let weight = cube_texel_solid_angle_sr(cube.face_size, x, y);
-            let texel = ((face * cube.face_size + y) * cube.face_size + x) * 3;
-            for (sum, &value) in sum.iter_mut().zip(&cube.rgb[texel..]) {
-                *sum += weight * f64::from(value);
-            }
-            total += weight;
-        }
-        rgb.extend(sum.map(|value| (value / total) as f32));
+    let mut rgb = Bulk::new(Vec::with_capacity(6 * size * size * 3));
+    for line in 0..6 * size {
+        cancel.check()?;
+        rgb.extend((0..size).flat_map(|x| half_texel(cube, line / size, line % size, x)));
     }
-    Cube { face_size: size, rgb }
+    Ok(Cube { face_size: size, rgb: rgb.into_inner() })
+}
+
+/// The mean of the four texels that a texel of the next level covers.
+fn half_texel(cube: &Cube, face: usize, y: usize, x: usize) -> [f32; 3] {
+    let (mut sum, mut total) = ([0.0; 3], 0.0);
+    for (dy, dx) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+        let (x, y) = (2 * x + dx, 2 * y + dy);
+        let weight = cube_texel_solid_angle_sr(cube.face_size, x, y);
+        let texel = ((face * cube.face_size + y) * cube.face_size + x) * 3;
+        for (sum, &value) in sum.iter_mut().zip(&cube.rgb[texel..]) {
+            *sum += weight * f64::from(value);
+        }
+        total += weight;
+    }
+    sum.map(|value| (value / total) as f32)
 }
 
 /// Lines across a side face's piece between meridians.
@@ -99,9 +120,10 @@ impl<'a> Sampler<'a> {
     }
 
     /// ∫ (f, 1) dω over the texels (x, 0), (x, 1) … of a side face.
-    fn side_column(&self, face: usize, x: usize) -> Vec<[f64; 4]> {
+    fn side_column(&self, face: usize, x: usize, cancel: Cancel) -> Result<Vec<[f64; 4]>, Cancelled> {
         let mut sums = vec![[0.0; 4]; self.face_size];
         for piece in self.between_meridians(face, x).windows(2) {
+            cancel.check()?;
             let half = 0.5 * (piece[1] - piece[0]);
             let u = panorama_uv(cube_direction(face, piece[0] + half, 0.0))[0];
             let column = self.column_at(u);
@@ -109,7 +131,7 @@ impl<'a> Sampler<'a> {
                 self.add_line(piece[0] + half * (1.0 + y), weight * half, column, &mut sums);
             }
         }
-        sums
+        Ok(sums)
     }
 
     fn column_at(&self, u: f64) -> usize {
@@ -150,18 +172,19 @@ impl<'a> Sampler<'a> {
     }
 
     /// ∫ (f, 1) dω over the texels of the top (2) or bottom (3) face, row by row.
-    fn cap(&self, face: usize) -> Vec<[f64; 4]> {
-        let mut sums = vec![[0.0; 4]; self.face_size * self.face_size];
+    fn cap(&self, face: usize, cancel: Cancel) -> Result<Vec<[f64; 4]>, Cancelled> {
+        let mut sums = Bulk::new(vec![[0.0; 4]; self.face_size * self.face_size]);
         let width = self.panorama.width();
         let pieces = libm::ceil(PI * self.face_size as f64 / width as f64) as usize;
         let piece = 2.0 * PI / (width * pieces) as f64;
         for index in 0..width * pieces {
+            cancel.check()?;
             for &(y, weight) in &self.rays {
                 let lambda = piece * (index as f64 + 0.5 + 0.5 * y);
                 self.add_ray(face, lambda, 0.5 * piece * weight, index / pieces, &mut sums);
             }
         }
-        sums
+        Ok(sums.into_inner())
     }
 
     /// Adds weight · ∫ (f, 1) sin θ dθ along a meridian of a cap: a ray (s, t) = ρ (a, b), ρ = tan θ from the pole.

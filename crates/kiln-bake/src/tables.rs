@@ -1,5 +1,6 @@
 //! Tables and laws that do not depend on an environment.
 
+use kiln_sphere::{Cancel, Cancelled};
 use rayon::prelude::*;
 
 /// Perceptual roughness of mip `level` in a chain of `level_count`: level/(n − 1), 0 for a chain of one.
@@ -11,11 +12,17 @@ pub fn roughness_of_level(level: usize, level_count: usize) -> f64 {
 ///
 /// Column x is n·v = (x + ½)/size, row y is perceptual roughness (y + ½)/size; row 0 first. Within 1e-6 of the
 /// integral (`kiln_brdf::dfg_ggx`) before rounding to `f32`.
-pub fn dfg_table(size: usize) -> Vec<[f32; 2]> {
+///
+/// # Errors
+/// [`Cancelled`] within an entry's work.
+pub fn dfg_table(size: usize, cancel: Cancel) -> Result<Vec<[f32; 2]>, Cancelled> {
     let centre = |index: usize| (index as f64 + 0.5) / size as f64;
     (0..size * size)
         .into_par_iter()
-        .map(|index| kiln_brdf::dfg_ggx_table_entry(centre(index % size), centre(index / size)))
-        .map(|[scale, bias]| [scale as f32, bias as f32])
+        .map(|index| {
+            cancel.check()?;
+            let entry = kiln_brdf::dfg_ggx_table_entry(centre(index % size), centre(index / size));
+            Ok(entry.map(|value| value as f32))
+        })
         .collect()
 }

@@ -1,5 +1,6 @@
 //! The recipes against closed forms, symmetries and brute force.
 
+mod cancelled_step_ends_soon;
 mod environments;
 mod recipes;
 mod transform;

@@ -1,5 +1,7 @@
 //! Colour spaces by their chromaticities, the sRGB transfer function, luminance.
 
+use crate::{Cancel, Cancelled, decode::CHECK_TEXELS};
+
 /// CIE xy of the three primaries and of white.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chromaticities {
@@ -90,13 +92,29 @@ pub fn transform(m: &Matrix, v: [f64; 3]) -> [f64; 3] {
 }
 
 /// Applies a matrix to every texel, in `f64`, rounded once.
-pub fn transform_texels(matrix: &Matrix, rgb: &mut [f32]) {
-    for texel in rgb.chunks_exact_mut(3) {
-        let out = transform(matrix, [texel[0].into(), texel[1].into(), texel[2].into()]);
-        for (value, new) in texel.iter_mut().zip(out) {
-            *value = new as f32;
+///
+/// # Errors
+/// [`Cancelled`], with some texels changed.
+pub fn transform_texels(matrix: &Matrix, rgb: &mut [f32], cancel: Cancel) -> Result<(), Cancelled> {
+    change_texels(rgb, |texel| transform(matrix, texel), cancel)
+}
+
+/// Replaces every texel by what `change` makes of it.
+pub(crate) fn change_texels(
+    rgb: &mut [f32],
+    change: impl Fn([f64; 3]) -> [f64; 3],
+    cancel: Cancel,
+) -> Result<(), Cancelled> {
+    for texels in rgb.chunks_mut(3 * CHECK_TEXELS) {
+        cancel.check()?;
+        for texel in texels.chunks_exact_mut(3) {
+            let out = change([texel[0].into(), texel[1].into(), texel[2].into()]);
+            for (value, new) in texel.iter_mut().zip(out) {
+                *value = new as f32;
+            }
         }
     }
+    Ok(())
 }
 
 /// sRGB's electro-optical transfer function, exact piecewise form (IEC 61966-2-1); 0…1 to 0…1.

@@ -1,9 +1,9 @@
 //! PNG and JPEG: display-referred pictures, decoded as what they can at most mean.
 
 use crate::{
-    DecodeError, Decoded, Image, Limits,
+    Bulk, Cancel, Cancelled, DecodeError, Decoded, Image, Limits,
     colour::srgb_to_linear,
-    decode::{check_size, guard},
+    decode::{CHECK_TEXELS, check_size, guard},
 };
 use image::{DynamicImage, ImageDecoder, ImageError, ImageReader};
 use std::io::Cursor;
@@ -25,11 +25,21 @@ impl Kind {
 }
 
 /// Decodes as sRGB; the notes say that a range of 0…1 is no radiance.
-pub(crate) fn decode(bytes: &[u8], kind: Kind, limits: &Limits) -> Result<Decoded, DecodeError> {
-    guard(kind.name(), || decode_unguarded(bytes, kind, limits))
+pub(crate) fn decode(
+    bytes: &[u8],
+    kind: Kind,
+    limits: &Limits,
+    cancel: Cancel,
+) -> Result<Decoded, DecodeError> {
+    guard(kind.name(), || decode_unguarded(bytes, kind, limits, cancel))
 }
 
-fn decode_unguarded(bytes: &[u8], kind: Kind, limits: &Limits) -> Result<Decoded, DecodeError> {
+fn decode_unguarded(
+    bytes: &[u8],
+    kind: Kind,
+    limits: &Limits,
+    cancel: Cancel,
+) -> Result<Decoded, DecodeError> {
     let format = kind.name();
     let failed = |error| explain(error, format, bytes.len());
     let image_format = match kind {
@@ -48,19 +58,33 @@ fn decode_unguarded(bytes: &[u8], kind: Kind, limits: &Limits) -> Result<Decoded
     if decoded.color().has_alpha() {
         notes.push("alpha was ignored".to_owned());
     }
-    let image = Image::new(width as usize, height as usize, linear_values(decoded))?;
+    let image = Image::new(width as usize, height as usize, linear_values(decoded, cancel)?)?;
     Ok(Decoded { image, format, notes })
 }
 
-fn linear_values(decoded: DynamicImage) -> Vec<f32> {
+fn linear_values(decoded: DynamicImage, cancel: Cancel) -> Result<Vec<f32>, Cancelled> {
     let is_8_bit = decoded.color().bytes_per_pixel() == decoded.color().channel_count();
     if is_8_bit {
         let table: [f32; 256] = std::array::from_fn(|value| srgb_to_linear(value as f64 / 255.0) as f32);
-        decoded.into_rgb8().into_raw().into_iter().map(|value| table[usize::from(value)]).collect()
+        convert(decoded.into_rgb8().into_raw(), |value| table[usize::from(value)], cancel)
     } else {
         let linear = |value: u16| srgb_to_linear(f64::from(value) / 65535.0) as f32;
-        decoded.into_rgb16().into_raw().into_iter().map(linear).collect()
+        convert(decoded.into_rgb16().into_raw(), linear, cancel)
     }
+}
+
+fn convert<T: Copy + Send + 'static>(
+    stored: Vec<T>,
+    linear: impl Fn(T) -> f32,
+    cancel: Cancel,
+) -> Result<Vec<f32>, Cancelled> {
+    let stored = Bulk::new(stored);
+    let mut rgb = Bulk::new(Vec::with_capacity(stored.len()));
+    for values in stored.chunks(CHECK_TEXELS) {
+        cancel.check()?;
+        rgb.extend(values.iter().map(|&value| linear(value)));
+    }
+    Ok(rgb.into_inner())
 }
 
 fn explain(error: ImageError, format: &'static str, end: usize) -> DecodeError {

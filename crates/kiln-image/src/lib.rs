@@ -8,6 +8,8 @@
 //! +X, row 0 is the top (+Y); cube faces in KTX2 order +X −X +Y −Y +Z −Z, each row-major from its top
 //! left as KTX2/Vulkan sample it; linear Rec. 709 D65, relative radiance, three channels interleaved.
 //!
+//! Decoding and checking take a [`Cancel`], since a large file takes a while.
+//!
 //! Not here: what a map means (`kiln-bake`), directions and transforms (`kiln-sphere`), files (`kiln-project`).
 
 pub mod colour;
@@ -23,6 +25,8 @@ mod texels;
 
 #[cfg(test)]
 mod tests;
+
+pub use kiln_sphere::{Bulk, Cancel, Cancelled};
 
 pub use decode::{DecodeError, Decoded, Limits, decode};
 pub use layout::{Cube, Image, LayoutError, Panorama};

@@ -1,6 +1,7 @@
 //! What is wrong with an image's numbers, and its repair.
 
-use crate::{Image, colour::luminance};
+use crate::{Bulk, Cancel, Cancelled, Image, colour::luminance, decode::CHECK_TEXELS};
+use std::mem::replace;
 use thiserror::Error;
 
 /// The largest finite binary16 number.
@@ -70,19 +71,25 @@ pub struct Repair {
     pub flux_moved: f64,
 }
 
-/// An image refused by [`TexelPolicy::Error`].
+/// Why a [`TexelPolicy`] was not carried through.
 #[derive(Clone, Debug, Error, PartialEq)]
-#[error("texel ({}, {}) holds {} in channel {}; {nan} values are NaN, {infinite} infinite, {negative} negative",
-    place.x, place.y, place.value, place.channel)]
-pub struct TexelError {
-    /// The worst of them: NaN before infinite before negative.
-    pub place: Place,
-    /// Values that are NaN.
-    pub nan: usize,
-    /// Values that are ±∞.
-    pub infinite: usize,
-    /// Values below zero.
-    pub negative: usize,
+pub enum TexelError {
+    /// [`TexelPolicy::Error`] refuses the image.
+    #[error("texel ({}, {}) holds {} in channel {}; {nan} values are NaN, {infinite} infinite, {negative} negative",
+        place.x, place.y, place.value, place.channel)]
+    NoRadiance {
+        /// The worst of them: NaN before infinite before negative.
+        place: Place,
+        /// Values that are NaN.
+        nan: usize,
+        /// Values that are ±∞.
+        infinite: usize,
+        /// Values below zero.
+        negative: usize,
+    },
+    /// The image is not wanted any more; some of it may be repaired.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
 
 impl TexelReport {
@@ -96,16 +103,16 @@ impl TexelPolicy {
     /// Applies the policy; the returned counts are zero where nothing was changed.
     ///
     /// # Errors
-    /// [`TexelError`] from [`TexelPolicy::Error`] where a value is NaN, infinite or negative.
-    pub fn apply(self, image: &mut Image) -> Result<Repair, TexelError> {
+    /// [`TexelError::NoRadiance`] from [`TexelPolicy::Error`] where a value is NaN, infinite or negative.
+    pub fn apply(self, image: &mut Image, cancel: Cancel) -> Result<Repair, TexelError> {
         match self {
-            TexelPolicy::Repair => Ok(repair_texels(image)),
+            TexelPolicy::Repair => Ok(repair_texels(image, cancel)?),
             TexelPolicy::Keep => Ok(Repair::default()),
             TexelPolicy::Error => {
-                let report = check_texels(image);
+                let report = check_texels(image, cancel)?;
                 match report.nan.worst.or(report.infinite.worst).or(report.negative.worst) {
                     None => Ok(Repair::default()),
-                    Some(place) => Err(TexelError {
+                    Some(place) => Err(TexelError::NoRadiance {
                         place,
                         nan: report.nan.count,
                         infinite: report.infinite.count,
@@ -127,7 +134,10 @@ impl Defect {
 }
 
 /// Counts what is no radiance and measures what is.
-pub fn check_texels(image: &Image) -> TexelReport {
+///
+/// # Errors
+/// [`Cancelled`] within a few rows' work.
+pub fn check_texels(image: &Image, cancel: Cancel) -> Result<TexelReport, Cancelled> {
     let mut report = TexelReport {
         nan: Defect::default(),
         infinite: Defect::default(),
@@ -139,6 +149,9 @@ pub fn check_texels(image: &Image) -> TexelReport {
     };
     let (mut luminance_sum, mut finite_texels) = (0.0, 0_usize);
     for (index, texel) in image.rgb.chunks_exact(3).enumerate() {
+        if index.is_multiple_of(CHECK_TEXELS) {
+            cancel.check()?;
+        }
         let (x, y) = (index % image.width, index / image.width);
         for (channel, &value) in texel.iter().enumerate() {
             check_value(&mut report, Place { x, y, channel, value });
@@ -149,7 +162,7 @@ pub fn check_texels(image: &Image) -> TexelReport {
         }
     }
     report.mean_luminance = luminance_sum / finite_texels.max(1) as f64;
-    report
+    Ok(report)
 }
 
 fn check_value(report: &mut TexelReport, place: Place) {
@@ -178,27 +191,56 @@ fn check_value(report: &mut TexelReport, place: Place) {
 /// from their rim inwards, one ring per pass, and an image without any finite value becomes black.
 /// Columns wrap where the image has a panorama's shape. Negative values become 0 first, so that they
 /// do not darken what is filled in.
-pub fn repair_texels(image: &mut Image) -> Repair {
+///
+/// # Errors
+/// [`Cancelled`], with the image half repaired.
+pub fn repair_texels(image: &mut Image, cancel: Cancel) -> Result<Repair, Cancelled> {
     let mut repair = Repair::default();
     let mut moved = 0.0;
     let stride = image.width * 3;
     let weights: Vec<f64> = (0..image.height).map(|y| row_weight(image, y)).collect();
-    let mut holes = Vec::new();
     for (index, value) in image.rgb.iter_mut().enumerate() {
+        if index.is_multiple_of(CHECK_TEXELS) {
+            cancel.check()?;
+        }
         if !value.is_finite() {
-            holes.push(index);
+            repair.non_finite += 1;
         } else if *value < 0.0 {
             moved -= f64::from(*value) * weights[index / stride];
             *value = 0.0;
             repair.negative += 1;
         }
     }
-    repair.non_finite = holes.len();
-    close_holes(image, &holes);
-    moved += holes.iter().map(|&index| f64::from(image.rgb[index]) * weights[index / stride]).sum::<f64>();
-    let total: f64 = image.rgb.iter().enumerate().map(|(i, &v)| f64::from(v) * weights[i / stride]).sum();
+    let holes = find_holes(image, repair.non_finite, cancel)?;
+    close_holes(image, &holes, cancel)?;
+    let flux = |index: usize| f64::from(image.rgb[index]) * weights[index / stride];
+    moved += sum(holes.iter().map(|&index| flux(index)), cancel)?;
+    let total = sum((0..image.rgb.len()).map(flux), cancel)?;
     repair.flux_moved = if moved > 0.0 { moved / total.max(f64::MIN_POSITIVE) } else { 0.0 };
-    repair
+    Ok(repair)
+}
+
+/// The indices of the `count` values that are not finite.
+fn find_holes(image: &Image, count: usize, cancel: Cancel) -> Result<Bulk<Vec<usize>>, Cancelled> {
+    // Of the right size at once: growing means copying, which cannot be interrupted.
+    let mut holes = Bulk::new(Vec::with_capacity(count));
+    if count == 0 {
+        return Ok(holes);
+    }
+    for (block, values) in image.rgb.chunks(CHECK_TEXELS).enumerate() {
+        cancel.check()?;
+        let is_hole =
+            |(index, value): (usize, &f32)| (!value.is_finite()).then_some(block * CHECK_TEXELS + index);
+        holes.extend(values.iter().enumerate().filter_map(is_hole));
+    }
+    Ok(holes)
+}
+
+fn sum(values: impl Iterator<Item = f64>, cancel: Cancel) -> Result<f64, Cancelled> {
+    let checked = |(index, value): (usize, f64)| {
+        if index.is_multiple_of(CHECK_TEXELS) { cancel.check().map(|()| value) } else { Ok(value) }
+    };
+    values.enumerate().map(checked).sum()
 }
 
 fn is_panorama_shaped(image: &Image) -> bool {
@@ -214,24 +256,51 @@ fn row_weight(image: &Image, y: usize) -> f64 {
     }
 }
 
+/// Holes between two looks at a [`Cancel`]: each has eight neighbours.
+const CHECK_HOLES: usize = CHECK_TEXELS / 16;
+
 /// Fills from the rim; a pass reads only what earlier passes left finite, so order does not matter, and
 /// looks only where the last one reached, so the work is linear in the number of holes.
-fn close_holes(image: &mut Image, holes: &[usize]) {
-    let mut rim = holes.to_vec();
-    while !rim.is_empty() {
-        let filled: Vec<(usize, f32)> =
-            rim.iter().filter_map(|&index| Some((index, neighbour_mean(image, index)?))).collect();
-        filled.iter().for_each(|&(index, value)| image.rgb[index] = value);
-        let reached = filled.iter().flat_map(|&(index, _)| neighbours(image, index));
-        rim = reached.filter(|&index| !image.rgb[index].is_finite()).collect();
-        rim.sort_unstable();
-        rim.dedup();
+fn close_holes(image: &mut Image, holes: &[usize], cancel: Cancel) -> Result<(), Cancelled> {
+    if holes.is_empty() {
+        return Ok(());
     }
-    for &index in holes {
-        if !image.rgb[index].is_finite() {
-            image.rgb[index] = 0.0;
+    // Who is reached has a finite neighbour, is filled in the next pass, and is reached no more.
+    let mut is_reached = Bulk::new(vec![false; image.rgb.len()]);
+    let mut rim = Bulk::new(Vec::with_capacity(holes.len()));
+    for indices in holes.chunks(CHECK_TEXELS) {
+        cancel.check()?;
+        rim.extend_from_slice(indices);
+    }
+    let mut filled = Bulk::new(Vec::with_capacity(holes.len()));
+    while !rim.is_empty() {
+        for indices in rim.chunks(CHECK_HOLES) {
+            cancel.check()?;
+            filled.extend(indices.iter().filter_map(|&index| Some((index, neighbour_mean(image, index)?))));
+        }
+        for values in filled.chunks(CHECK_TEXELS) {
+            cancel.check()?;
+            values.iter().for_each(|&(index, value)| image.rgb[index] = value);
+        }
+        rim.clear();
+        for values in filled.chunks(CHECK_HOLES) {
+            cancel.check()?;
+            let reached = values.iter().flat_map(|&(index, _)| neighbours(image, index));
+            let next =
+                |index: &usize| !image.rgb[*index].is_finite() && !replace(&mut is_reached[*index], true);
+            rim.extend(reached.filter(next));
+        }
+        filled.clear();
+    }
+    for indices in holes.chunks(CHECK_TEXELS) {
+        cancel.check()?;
+        for &index in indices {
+            if !image.rgb[index].is_finite() {
+                image.rgb[index] = 0.0;
+            }
         }
     }
+    Ok(())
 }
 
 fn neighbour_mean(image: &Image, index: usize) -> Option<f32> {

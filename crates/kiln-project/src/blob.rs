@@ -6,6 +6,12 @@ use kiln_image::{Image, Panorama};
 const MAGIC: &[u8; 8] = b"KILNPAN1";
 const HEADER_BYTES: usize = 16;
 
+/// Width and height of a stored panorama of this length: it is twice as wide as high.
+pub(crate) fn panorama_size(blob_bytes: usize) -> (usize, usize) {
+    let height = (blob_bytes.saturating_sub(HEADER_BYTES) / 24).isqrt();
+    (2 * height, height)
+}
+
 pub(crate) fn encode_panorama(panorama: &Panorama) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(HEADER_BYTES + panorama.rgb().len() * 4);
     bytes.extend_from_slice(MAGIC);

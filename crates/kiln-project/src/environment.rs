@@ -2,14 +2,18 @@
 
 use std::sync::Arc;
 
-use kiln_bake::{Accuracy, Analysis, AnalysisRequest, EncodedLevel, TexelFormat};
-use kiln_build::{Action, ActionId, ActionOutput, Command, Engine, Error, Input, Inputs, little_memory};
+use kiln_bake::{
+    Accuracy, Analysis, AnalysisRequest, BakeError, Cancel, Cancelled, EncodedLevel, TexelFormat,
+};
+use kiln_build::{
+    Action, ActionId, ActionOutput, Command, Engine, Error, Input, Inputs, MemoryNeed, little_memory,
+};
 use kiln_diagnostic::Diagnostic;
-use kiln_image::{Cube, Decoded, Limits, Panorama, TexelPolicy, check_texels};
+use kiln_image::{Cube, DecodeError, Decoded, Limits, Panorama, TexelError, TexelPolicy, check_texels};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::blob::{decode_panorama, encode_panorama};
+use crate::blob::{decode_panorama, encode_panorama, panorama_size};
 use crate::plan::{PartSpec, Planner, no_content, rank, unreadable};
 use crate::{EnvConfig, Range};
 
@@ -103,6 +107,12 @@ impl Steps<'_> {
         Action { name, command, inputs, rank: rank::ENVIRONMENT, memory, perform: Arc::new(perform) }
     }
 
+    /// The need of a step that reads an analysis first and makes a map of this size.
+    fn map_memory(&self, alpha: f64, face_size: usize) -> Arc<MemoryNeed> {
+        let error = self.env.error;
+        needs(move |lengths| kiln_bake::memory::specular_level(lengths[0], error, alpha, face_size))
+    }
+
     fn encoding(&self) -> Value {
         json!({"format": format_name(self.env.format), "range": range_name(self.env.range)})
     }
@@ -114,12 +124,13 @@ impl Steps<'_> {
         let unreadable = unreadable(engine, &self.env.source);
         let params = json!({"texels": policy_name(policy), "unreadable": unreadable});
         let command = command("decode", 2, params, &["panorama", "report"]);
-        self.action("", command, vec![input], move |inputs| {
+        let action = self.action("", command, vec![input], move |inputs| {
             Ok(match inputs.bytes(0)? {
-                Some(bytes) => decode(&bytes, policy),
+                Some(bytes) => decode(&bytes, policy, cancel(inputs))?,
                 None => failure(no_content("environment", unreadable.as_deref())),
             })
-        })
+        });
+        Action { memory: needs(|lengths| kiln_bake::memory::decode(lengths[0])), ..action }
     }
 
     fn analyse(&self, decode: ActionId) -> Action {
@@ -128,11 +139,19 @@ impl Steps<'_> {
         let request = AnalysisRequest { alpha_min: roughness * roughness, error: self.env.error };
         let params = json!({"alpha_min": request.alpha_min, "error": request.error});
         let command = command("analyse", 1, params, &["analysis"]);
-        self.action("", command, vec![output(decode, "panorama")], move |inputs| {
-            let analysis = kiln_bake::analyse(&panorama(inputs, 0)?, &request);
+        let action = self.action("", command, vec![output(decode, "panorama")], move |inputs| {
+            let cancel = cancel(inputs);
+            let analysis = kiln_bake::analyse(&panorama(inputs, 0)?, &request, cancel).map_err(ended)?;
             let meta = json!({"detail": {"band_limit": analysis.band_limit(), "mean": analysis.mean()}});
-            Ok(success("analysis", analysis.to_bytes(), meta))
-        })
+            Ok(success("analysis", analysis.to_bytes(cancel).map_err(ended)?, meta))
+        });
+        Action {
+            memory: needs(|lengths| {
+                let (width, height) = panorama_size(lengths[0]);
+                kiln_bake::memory::analyse(width, height)
+            }),
+            ..action
+        }
     }
 
     fn skybox(&self, decode: ActionId) -> Action {
@@ -140,14 +159,17 @@ impl Steps<'_> {
         let inputs = vec![output(decode, "panorama"), output(decode, "report")];
         let mut params = self.encoding();
         params["mirror_size"] = json!(env.size);
+        let mirror_size = env.size;
         let command = command("skybox", 2, params, &[LEVELS, MIRROR]);
-        self.action("", command, inputs, move |inputs| {
+        let action = self.action("", command, inputs, move |inputs| {
+            let cancel = cancel(inputs);
             let panorama = panorama(inputs, 0)?;
             let report = report(inputs, 1)?;
             let face_size = skybox_face_size(report.width);
-            let levels = kiln_bake::skybox(&panorama, face_size);
+            let levels = kiln_bake::skybox(&panorama, face_size, cancel).map_err(ended)?;
             let encode = Encode::new(&env, &report);
-            let encoded: Vec<EncodedLevel> = levels.iter().map(|cube| encode.level(cube)).collect();
+            let encoded: Vec<EncodedLevel> =
+                levels.iter().map(|cube| encode.level(cube, cancel)).collect::<Result<_, _>>()?;
             let mut shared = encode.facts();
             shared["size"] = json!(face_size);
             shared["levels"] = json!(levels.len());
@@ -155,24 +177,39 @@ impl Steps<'_> {
             let meta = json!({"shared": shared, "detail": {"rounding_rms": rounding}});
             let mirror = match levels.iter().position(|level| level.face_size == env.size) {
                 Some(level) => encoded[level].bytes.clone(),
-                None => encode.level(&kiln_bake::skybox(&panorama, env.size)[0]).bytes,
+                None => {
+                    let levels = kiln_bake::skybox(&panorama, env.size, cancel).map_err(ended)?;
+                    encode.level(&levels[0], cancel)?.bytes
+                }
             };
             let name = |index: usize| format!("{LEVELS}/mip{index}");
             let named = encoded.into_iter().enumerate().map(|(index, level)| (name(index), level.bytes));
             let outputs = named.chain([(MIRROR.to_owned(), mirror)]).collect();
             Ok(ActionOutput { outputs, meta, diagnostics: encode.notes() })
-        })
+        });
+        Action {
+            memory: needs(move |lengths| {
+                let (width, height) = panorama_size(lengths[0]);
+                kiln_bake::memory::skybox(width, height, skybox_face_size(width).max(mirror_size))
+            }),
+            ..action
+        }
     }
 
     fn irradiance(&self, decode: ActionId, analyse: ActionId) -> Action {
         let env = self.env.clone();
         let mut params = self.encoding();
         params["size"] = json!(env.irradiance_size);
+        let memory = self.map_memory(1.0, env.irradiance_size);
         let inputs = vec![output(analyse, "analysis"), output(decode, "report")];
-        self.action("", command("irradiance", 1, params, &[LEVEL]), inputs, move |inputs| {
-            let map = kiln_bake::irradiance(&analysis(inputs, 0)?, env.irradiance_size);
-            Ok(Encode::new(&env, &report(inputs, 1)?).output(LEVEL, &map.cube, accuracy_facts(&map.accuracy)))
-        })
+        let action = self.action("", command("irradiance", 1, params, &[LEVEL]), inputs, move |inputs| {
+            let cancel = cancel(inputs);
+            let analysis = analysis(inputs, 0)?;
+            let map = kiln_bake::irradiance(&analysis, env.irradiance_size, cancel).map_err(ended)?;
+            let detail = accuracy_facts(&map.accuracy);
+            Encode::new(&env, &report(inputs, 1)?).output(LEVEL, &map.cube, detail, cancel)
+        });
+        Action { memory: memory, ..action }
     }
 
     fn sh(&self, analyse: ActionId) -> Action {
@@ -198,29 +235,37 @@ impl Steps<'_> {
         let mut params = self.encoding();
         params["size"] = json!(face_size);
         params["alpha"] = json!(roughness * roughness);
+        let memory = self.map_memory(roughness * roughness, face_size);
         let inputs = vec![output(analyse, "analysis"), output(decode, "report")];
         let command = command("prefilter", 1, params, &[LEVEL]);
-        self.action(&format!("/specular mip {level}"), command, inputs, move |inputs| {
-            let map = kiln_bake::specular_level(&analysis(inputs, 0)?, roughness * roughness, face_size);
+        let action = self.action(&format!("/specular mip {level}"), command, inputs, move |inputs| {
+            let cancel = cancel(inputs);
+            let analysis = analysis(inputs, 0)?;
+            let alpha = roughness * roughness;
+            let map = kiln_bake::specular_level(&analysis, alpha, face_size, cancel).map_err(ended)?;
             let mut detail = accuracy_facts(&map.accuracy);
             detail["roughness"] = json!(roughness);
-            Ok(Encode::new(&env, &report(inputs, 1)?).output(LEVEL, &map.cube, detail))
-        })
+            Encode::new(&env, &report(inputs, 1)?).output(LEVEL, &map.cube, detail, cancel)
+        });
+        Action { memory: memory, ..action }
     }
 }
 
-fn decode(bytes: &[u8], policy: TexelPolicy) -> ActionOutput {
-    let decoded = match kiln_image::decode(bytes, &Limits::default()) {
+fn decode(bytes: &[u8], policy: TexelPolicy, cancel: Cancel) -> Result<ActionOutput, Error> {
+    let fail = |error: &dyn std::fmt::Display| Ok(failure(Diagnostic::error(error.to_string())));
+    let decoded = match kiln_image::decode(bytes, &Limits::default(), cancel) {
         Ok(decoded) => decoded,
+        Err(DecodeError::Cancelled(cancelled)) => return Err(ended(cancelled)),
         Err(error) => {
             let help = "export the panorama again as .hdr or .exr";
-            return failure(Diagnostic::error(error.to_string()).with_help(help));
+            return Ok(failure(Diagnostic::error(error.to_string()).with_help(help)));
         }
     };
     let Decoded { mut image, format, notes } = decoded;
     let mut diagnostics: Vec<Diagnostic> = notes.into_iter().map(Diagnostic::note).collect();
-    match policy.apply(&mut image) {
-        Err(error) => return failure(Diagnostic::error(error.to_string())),
+    match policy.apply(&mut image, cancel) {
+        Err(TexelError::Cancelled(cancelled)) => return Err(ended(cancelled)),
+        Err(error) => return fail(&error),
         Ok(repair) if repair.non_finite + repair.negative > 0 => {
             let message = format!(
                 "repaired {} non-finite and {} negative values; relative flux moved {:.2e}",
@@ -230,16 +275,16 @@ fn decode(bytes: &[u8], policy: TexelPolicy) -> ActionOutput {
         }
         Ok(_) => {}
     }
-    let max = check_texels(&image).max;
+    let max = check_texels(&image, cancel).map_err(ended)?.max;
     let (width, height) = (image.width, image.height);
     let panorama = match Panorama::new(image) {
         Ok(panorama) => panorama,
-        Err(error) => return failure(Diagnostic::error(error.to_string())),
+        Err(error) => return fail(&error),
     };
     let report = serde_json::to_vec(&Report { width, height, max }).unwrap_or_default();
     let meta = json!({"detail": {"format": format, "width": width, "height": height, "max": max}});
     let outputs = vec![("panorama".to_owned(), encode_panorama(&panorama)), ("report".to_owned(), report)];
-    ActionOutput { outputs, meta, diagnostics }
+    Ok(ActionOutput { outputs, meta, diagnostics })
 }
 
 /// How the maps of one environment are stored: all with the same format and scale.
@@ -260,18 +305,24 @@ impl Encode {
         Encode { format, scale_log2, max: report.max }
     }
 
-    fn level(&self, cube: &Cube) -> EncodedLevel {
-        kiln_bake::encode_level(cube, self.format, self.scale_log2)
+    fn level(&self, cube: &Cube, cancel: Cancel) -> Result<EncodedLevel, Error> {
+        kiln_bake::encode_level(cube, self.format, self.scale_log2, cancel).map_err(ended)
     }
 
     fn facts(&self) -> Value {
         json!({"format": format_name(self.format), "scale_log2": self.scale_log2})
     }
 
-    fn output(&self, name: &str, cube: &Cube, mut detail: Value) -> ActionOutput {
-        let level = self.level(cube);
+    fn output(
+        &self,
+        name: &str,
+        cube: &Cube,
+        mut detail: Value,
+        cancel: Cancel,
+    ) -> Result<ActionOutput, Error> {
+        let level = self.level(cube, cancel)?;
         detail["rounding_rms"] = json!(level.rounding_rms);
-        success(name, level.bytes, json!({"shared": self.facts(), "detail": detail}))
+        Ok(success(name, level.bytes, json!({"shared": self.facts(), "detail": detail})))
     }
 
     /// Said once per environment, with the skybox.
@@ -322,11 +373,32 @@ fn panorama(inputs: &Inputs, index: usize) -> Result<Panorama, Error> {
 }
 
 fn analysis(inputs: &Inputs, index: usize) -> Result<Analysis, Error> {
-    Analysis::from_bytes(&inputs.required(index)?).map_err(|error| damaged("an analysis", &error))
+    Analysis::from_bytes(&inputs.required(index)?, cancel(inputs)).map_err(|error| match error {
+        BakeError::Cancelled(cancelled) => ended(cancelled),
+        error => damaged("an analysis", &error),
+    })
 }
 
 fn report(inputs: &Inputs, index: usize) -> Result<Report, Error> {
     serde_json::from_slice(&inputs.required(index)?).map_err(|error| damaged("a report", &error))
+}
+
+pub(crate) fn cancel<'a>(inputs: &'a Inputs) -> Cancel<'a> {
+    Cancel::when(inputs.cancel())
+}
+
+/// What a step says that was ended early.
+pub(crate) fn ended(_: Cancelled) -> Error {
+    Error::Cancelled
+}
+
+/// A need in the recipes' numbers.
+fn needs(estimate: impl Fn(&[usize]) -> usize + Send + Sync + 'static) -> Arc<MemoryNeed> {
+    Arc::new(move |lengths| {
+        let lengths: Vec<usize> =
+            lengths.iter().map(|&length| usize::try_from(length).unwrap_or(usize::MAX)).collect();
+        estimate(&lengths) as u64
+    })
 }
 
 fn damaged(what: &str, error: &dyn std::fmt::Display) -> Error {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use kiln_build::{Action, ActionOutput, Engine, Error, Input, little_memory};
 use serde_json::{Value, json};
 
-use crate::environment::{command, failure, success};
+use crate::environment::{cancel, command, ended, failure, success};
 use crate::plan::{PartSpec, Planner, no_content, rank, unreadable};
 use crate::{Role, ShaderConfig};
 
@@ -119,8 +119,8 @@ pub(crate) fn plan_brdf_table(planner: &mut Planner) {
         inputs: Vec::new(),
         rank: rank::SCENE,
         memory: little_memory(),
-        perform: Arc::new(|_| {
-            let texels = kiln_bake::dfg_table(BRDF_TABLE_SIZE);
+        perform: Arc::new(|inputs| {
+            let texels = kiln_bake::dfg_table(BRDF_TABLE_SIZE, cancel(inputs)).map_err(ended)?;
             let bytes = texels.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
             Ok(success("texels", bytes, Value::Null))
         }),

@@ -1,6 +1,6 @@
 use super::{Ground, LIMB_DARKENING, Sky, SunPosition, UNIT_CD_PER_M2, sun_and_sky, zenith};
 use crate::panorama::Row;
-use kiln_image::{Panorama, check_texels, colour::luminance};
+use kiln_image::{Cancel, Panorama, check_texels, colour::luminance};
 use std::f64::consts::PI;
 
 fn at(elevation_deg: f64) -> SunPosition {
@@ -22,7 +22,9 @@ fn every_sun_and_turbidity_gives_finite_radiance() {
     for elevation in [-90.0, 0.0, 0.1, 2.0, 45.0, 90.0, 400.0, f64::NAN] {
         for turbidity in [0.0, 3.0, 50.0, f64::NAN] {
             for width in [2, 64] {
-                let report = check_texels(sun_and_sky(width, at(elevation), turbidity).image());
+                let report =
+                    check_texels(sun_and_sky(width, at(elevation), turbidity).image(), Cancel::NEVER)
+                        .expect("nobody cancels");
                 assert!(report.is_radiance(), "{elevation}°, T = {turbidity}, {width}: {report:?}");
                 assert!(report.max > 0.0);
             }

@@ -11,8 +11,9 @@
 //! 3. Summed up on N ≥ L + 1 rings θ_n = π (n + ½)/N they stand for the step function exactly, and
 //!    ∫ … dθ = (π/N) Σ_n is exact too. The ring count is free of H, and the two hemispheres share P̄_lm.
 
+use crate::cancel::{Bulk, Cancel, Cancelled};
 use crate::fft::{C64, Plan, bin, cis, even_fft_length, sinc};
-use crate::harmonics::{Coefficient, Harmonics};
+use crate::harmonics::{Coefficient, Harmonics, coefficient_count};
 use crate::legendre::{BATCH, LANES, Order, RingBlock, add_products};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -22,27 +23,49 @@ use std::f64::consts::PI;
 /// `rgb` holds `width · height · 3` values, row 0 at +Y. Any sizes from 1 × 1 are accepted; `band_limit` may
 /// exceed `width / 2`, since patches have content beyond it. Exact up to rounding: within 1e-11 of quadrature.
 /// Non-finite texels give non-finite coefficients. Panics if `rgb` has another length.
-pub fn analyse(width: usize, height: usize, rgb: &[f32], band_limit: usize) -> Harmonics {
+///
+/// # Errors
+/// [`Cancelled`] within a row's or a block of rings' work.
+pub fn analyse(
+    width: usize,
+    height: usize,
+    rgb: &[f32],
+    band_limit: usize,
+    cancel: Cancel,
+) -> Result<Harmonics, Cancelled> {
     assert!(width > 0 && rgb.len() == width * height * 3, "{width}x{height} texels, {} values", rgb.len());
-    let rows = row_spectra(width, height, rgb, band_limit);
+    let spectra = row_spectra(width, height, rgb, band_limit, cancel)?;
+    let rows: &[Coefficient] = &spectra;
     let columns = Columns::new(height, band_limit);
     let stride = rows.len() / height;
-    let orders = (0..=band_limit)
-        .into_par_iter()
-        .map(|m| {
-            let weight = cis(-PI * m as f64 / width as f64)
-                * (2.0 * PI / width as f64 * sinc(m as f64 / width as f64));
-            let (frequency, conjugate) = alias(m, width);
-            let column: Vec<[C64; 3]> = (0..height)
-                .map(|row| {
-                    let value = rows[row * stride + frequency];
-                    value.map(|z| if conjugate { z.conj() } else { z } * weight)
-                })
-                .collect();
-            columns.project(m, &column)
-        })
-        .collect();
-    Harmonics::from_orders(band_limit, orders)
+    let mut orders = Bulk::new(vec![Vec::new(); band_limit + 1]);
+    orders.par_iter_mut().enumerate().try_for_each(|(m, order)| {
+        let weight =
+            cis(-PI * m as f64 / width as f64) * (2.0 * PI / width as f64 * sinc(m as f64 / width as f64));
+        let (frequency, conjugate) = alias(m, width);
+        let column: Vec<[C64; 3]> = (0..height)
+            .map(|row| {
+                let [r, g, b] = values(&rows[row * stride + frequency]);
+                [r, g, b].map(|z| if conjugate { z.conj() } else { z } * weight)
+            })
+            .collect();
+        *order = columns.project(m, &column, cancel)?;
+        Ok(())
+    })?;
+    drop(spectra);
+    Harmonics::from_orders(band_limit, &mut orders, cancel)
+}
+
+/// Memory that [`analyse`] takes at most, its result included, its input and some kilobytes a thread not.
+pub fn analyse_bytes(width: usize, height: usize, band_limit: usize) -> usize {
+    let spectra = height * spectrum_length(width, band_limit);
+    // Once as orders, once as the result.
+    (spectra + 2 * coefficient_count(band_limit)) * size_of::<Coefficient>()
+}
+
+/// Frequencies a row's spectrum keeps.
+fn spectrum_length(width: usize, band_limit: usize) -> usize {
+    band_limit.min(width / 2) + 1
 }
 
 /// Where a real row's spectrum of period `width` holds frequency m, and whether conjugated.
@@ -52,13 +75,22 @@ fn alias(m: usize, width: usize) -> (usize, bool) {
 }
 
 /// Σ_j f_j e^{−2πimj/W} for 0 ≤ m ≤ min(L, W/2), row by row.
-fn row_spectra(width: usize, height: usize, rgb: &[f32], band_limit: usize) -> Vec<[C64; 3]> {
-    let stride = band_limit.min(width / 2) + 1;
+fn row_spectra(
+    width: usize,
+    height: usize,
+    rgb: &[f32],
+    band_limit: usize,
+    cancel: Cancel,
+) -> Result<Bulk<Vec<Coefficient>>, Cancelled> {
+    let stride = spectrum_length(width, band_limit);
     let fft = Plan::new(width).forward;
-    let mut spectra = vec![[C64::default(); 3]; height * stride];
-    spectra.par_chunks_mut(stride).zip(rgb.par_chunks(width * 3)).for_each_init(
+    // Plain zeros come from the system as they are touched, in the loop; zeros of another type would be written here,
+    // all 200 MB of them.
+    let mut spectra = Bulk::new(vec![[0.0; 6]; height * stride]);
+    spectra.par_chunks_mut(stride).zip(rgb.par_chunks(width * 3)).try_for_each_init(
         || (vec![C64::default(); width], vec![C64::default(); width]),
         |(red_green, blue), (out, row)| {
+            cancel.check()?;
             for (j, texel) in row.chunks_exact(3).enumerate() {
                 red_green[j] = C64::new(f64::from(texel[0]), f64::from(texel[1]));
                 blue[j] = C64::new(f64::from(texel[2]), 0.0);
@@ -69,11 +101,18 @@ fn row_spectra(width: usize, height: usize, rgb: &[f32], band_limit: usize) -> V
                 // Two real rows in one complex transform: their spectra are its Hermitian parts.
                 let (z, mirrored) = (red_green[m], red_green[bin(-(m as isize), width)].conj());
                 let difference = (z - mirrored) * 0.5;
-                *out = [(z + mirrored) * 0.5, C64::new(difference.im, -difference.re), blue[m]];
+                let red = (z + mirrored) * 0.5;
+                *out = [red.re, red.im, difference.im, -difference.re, blue[m].re, blue[m].im];
             }
+            Ok(())
         },
-    );
-    spectra
+    )?;
+    Ok(spectra)
+}
+
+/// The channels of a coefficient as complex numbers.
+fn values(&[a, b, c, d, e, f]: &Coefficient) -> [C64; 3] {
+    [C64::new(a, b), C64::new(c, d), C64::new(e, f)]
 }
 
 /// What all columns of one panorama share.
@@ -109,11 +148,12 @@ impl Columns {
     }
 
     /// a_lm for l = m … L from the column's F_m, one value per row and channel.
-    fn project(&self, m: usize, column: &[[C64; 3]]) -> Vec<Coefficient> {
+    fn project(&self, m: usize, column: &[[C64; 3]], cancel: Cancel) -> Result<Vec<Coefficient>, Cancelled> {
         let half = self.ring_count / 2;
         let mut even = vec![[0.0; 6]; half.next_multiple_of(LANES)];
         let mut odd = even.clone();
         for channel in 0..3 {
+            cancel.check()?;
             let rings = self.on_rings(m, column, channel);
             for n in 0..half {
                 let (north, south) = (rings[n], rings[self.ring_count - 1 - n]);
@@ -122,7 +162,7 @@ impl Columns {
                 odd[n][2 * channel..2 * channel + 2].copy_from_slice(&[difference.re, difference.im]);
             }
         }
-        self.integrate(m, &[even, odd])
+        self.integrate(m, &[even, odd], cancel)
     }
 
     /// F_m(θ) sin θ, band-limited, on the rings.
@@ -153,7 +193,12 @@ impl Columns {
     }
 
     /// (π/N) Σ_n P̄_lm(θ_n) g(θ_n) over both hemispheres; P̄_lm is even about the equator where l − m is.
-    fn integrate(&self, m: usize, parities: &[Vec<Coefficient>; 2]) -> Vec<Coefficient> {
+    fn integrate(
+        &self,
+        m: usize,
+        parities: &[Vec<Coefficient>; 2],
+        cancel: Cancel,
+    ) -> Result<Vec<Coefficient>, Cancelled> {
         let order = Order::new(m, self.band_limit);
         let count = self.band_limit + 1 - m;
         let mut sums = vec![[0.0; 6]; count.next_multiple_of(BATCH)];
@@ -161,6 +206,7 @@ impl Columns {
             if block.is_negligible(m, self.band_limit) {
                 continue;
             }
+            cancel.check()?;
             let first = index * LANES;
             let rings: [&[Coefficient; LANES]; 2] = std::array::from_fn(|parity| {
                 parities[parity][first..first + LANES].try_into().expect("padded to whole blocks")
@@ -172,7 +218,7 @@ impl Columns {
             });
         }
         let weight = PI / self.ring_count as f64;
-        sums[..count].iter().map(|sum| sum.map(|part| part * weight)).collect()
+        Ok(sums[..count].iter().map(|sum| sum.map(|part| part * weight)).collect())
     }
 }
 

@@ -1,5 +1,6 @@
 //! Spherical-harmonic coefficients of a three-channel real function.
 
+use crate::cancel::{Bulk, Cancel, Cancelled};
 use std::f64::consts::PI;
 
 /// One coefficient of all channels: re, im of red, green, blue.
@@ -14,24 +15,33 @@ pub(crate) type Coefficient = [f64; 6];
 pub struct Harmonics {
     band_limit: usize,
     /// Order by order: all l of m = 0, then all l ≥ 1 of m = 1 …
-    coefficients: Vec<Coefficient>,
+    coefficients: Bulk<Vec<Coefficient>>,
 }
 
 impl Harmonics {
     /// The zero function.
     pub fn zero(band_limit: usize) -> Self {
-        Self { band_limit, coefficients: vec![[0.0; 6]; coefficient_count(band_limit)] }
+        Self { band_limit, coefficients: Bulk::new(vec![[0.0; 6]; coefficient_count(band_limit)]) }
     }
 
-    /// From the coefficients of order 0, 1 …, each order from l = m up.
-    pub(crate) fn from_orders(band_limit: usize, orders: Vec<Vec<Coefficient>>) -> Self {
-        let coefficients: Vec<_> = orders.into_iter().flatten().collect();
+    /// From the coefficients of order 0, 1 …, each order from l = m up; takes them out one by one.
+    pub(crate) fn from_orders(
+        band_limit: usize,
+        orders: &mut [Vec<Coefficient>],
+        cancel: Cancel,
+    ) -> Result<Self, Cancelled> {
+        let mut coefficients = Bulk::new(Vec::with_capacity(coefficient_count(band_limit)));
+        for order in orders {
+            cancel.check()?;
+            coefficients.append(&mut std::mem::take(order));
+        }
         assert_eq!(coefficients.len(), coefficient_count(band_limit), "one list per order");
-        Self { band_limit, coefficients }
+        Ok(Self { band_limit, coefficients })
     }
 
     /// From the layout [`Harmonics::coefficients`] returns; `None` if the count does not fit the band limit.
     pub fn from_coefficients(band_limit: usize, coefficients: Vec<[f64; 6]>) -> Option<Self> {
+        let coefficients = Bulk::new(coefficients);
         (coefficients.len() == coefficient_count(band_limit)).then_some(Self { band_limit, coefficients })
     }
 
@@ -60,15 +70,19 @@ impl Harmonics {
     /// ‖f_l‖² = Σ_m |a_lm|² (all m from −l to l), summed over the channels, for l = 0 … band limit.
     ///
     /// Their sum over l is ∫ |f|² dω of the band-limited function (Parseval).
-    pub fn band_energies(&self) -> Vec<f64> {
+    ///
+    /// # Errors
+    /// [`Cancelled`] within an order's work.
+    pub fn band_energies(&self, cancel: Cancel) -> Result<Vec<f64>, Cancelled> {
         let mut energies = vec![0.0; self.band_limit + 1];
         for m in 0..=self.band_limit {
+            cancel.check()?;
             let multiplicity = if m == 0 { 1.0 } else { 2.0 };
             for (energy, a) in energies[m..].iter_mut().zip(self.order(m)) {
                 *energy += multiplicity * a.iter().map(|part| part * part).sum::<f64>();
             }
         }
-        energies
+        Ok(energies)
     }
 
     /// Mean over the sphere, a_00 / √4π, per channel.
@@ -79,6 +93,6 @@ impl Harmonics {
 }
 
 /// Number of (l, m) with 0 ≤ m ≤ l ≤ `band_limit`.
-pub fn coefficient_count(band_limit: usize) -> usize {
+pub const fn coefficient_count(band_limit: usize) -> usize {
     (band_limit + 1) * (band_limit + 2) / 2
 }

@@ -5,6 +5,7 @@
 //! and N = V, so the half vector stands at θ/2); Lambert's is max(cos θ, 0)/π. By Funk–Hecke a convolution
 //! scales the harmonics of degree l by κ_l = ∫ K(x) P_l(x) dx / ∫ K(x) dx, x = cos θ.
 
+use crate::cancel::{Cancel, Cancelled};
 use crate::quadrature::gauss_legendre;
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -37,10 +38,14 @@ impl Kernel {
 /// GGX (Trowbridge–Reitz), 0 < `alpha` ≤ 1: K = D(θ/2) max(cos θ, 0).
 ///
 /// κ_l within 1e-9 of an independent oracle (α ≥ 0.01, l ≤ 1024). Panics unless `alpha` is in (0, 1].
-pub fn kernel_ggx(alpha: f64, band_limit: usize) -> Kernel {
+///
+/// # Errors
+/// [`Cancelled`] within the work of a few nodes.
+pub fn kernel_ggx(alpha: f64, band_limit: usize, cancel: Cancel) -> Result<Kernel, Cancelled> {
     assert!(alpha > 0.0 && alpha <= 1.0, "GGX needs alpha in (0, 1], got {alpha}");
     let panels = panels(alpha, FRAC_PI_2, band_limit);
-    spectrum(band_limit, &panels, |theta| libm::log(ggx_distribution(alpha, theta) * libm::cos(theta)))
+    let ln_kernel = |theta| libm::log(ggx_distribution(alpha, theta) * libm::cos(theta));
+    spectrum(band_limit, &panels, ln_kernel, cancel)
 }
 
 /// The unnormalised GGX kernel D(θ/2) max(cos θ, 0) for a unit vector at cosine `x`, given 1 − x.
@@ -58,13 +63,16 @@ pub fn ggx_kernel_at(alpha: f64, one_minus_x: f64) -> f64 {
 
 /// Charlie (Estevez and Kulla 2017, "Production Friendly Microfacet Sheen BRDF"), 0 < `alpha` ≤ 1:
 /// K = (2 + 1/α) sin(θ/2)^(1/α) / 2π · max(cos θ, 0), in logarithms. Panics unless `alpha` is in (0, 1].
-pub fn kernel_charlie(alpha: f64, band_limit: usize) -> Kernel {
+///
+/// # Errors
+/// [`Cancelled`] within the work of a few nodes.
+pub fn kernel_charlie(alpha: f64, band_limit: usize, cancel: Cancel) -> Result<Kernel, Cancelled> {
     assert!(alpha > 0.0 && alpha <= 1.0, "Charlie needs alpha in (0, 1], got {alpha}");
     let ln_scale = libm::log((2.0 + 1.0 / alpha) / (2.0 * PI));
     let panels = panels(0.1, 2.0 * alpha, band_limit);
-    spectrum(band_limit, &panels, |theta| {
-        ln_scale + libm::log(libm::sin(0.5 * theta)) / alpha + libm::log(libm::cos(theta))
-    })
+    let ln_kernel =
+        |theta| ln_scale + libm::log(libm::sin(0.5 * theta)) / alpha + libm::log(libm::cos(theta));
+    spectrum(band_limit, &panels, ln_kernel, cancel)
 }
 
 /// Lambert: K = max(cos θ, 0)/π, in closed form.
@@ -121,10 +129,11 @@ struct Node {
     ln_kernel: f64,
 }
 
-fn nodes(edges: &[f64], ln_kernel: impl Fn(f64) -> f64) -> Vec<Node> {
+fn nodes(edges: &[f64], ln_kernel: impl Fn(f64) -> f64, cancel: Cancel) -> Result<Vec<Node>, Cancelled> {
     let rule = gauss_legendre(NODES);
     let mut nodes = Vec::with_capacity((edges.len() - 1) * NODES);
     for edge in edges.windows(2) {
+        cancel.check()?;
         let half = 0.5 * (edge[1] - edge[0]);
         for &(y, weight) in &rule {
             let theta = edge[0] + half * (1.0 + y);
@@ -134,11 +143,16 @@ fn nodes(edges: &[f64], ln_kernel: impl Fn(f64) -> f64) -> Vec<Node> {
             nodes.push(Node { one_minus_x: 2.0 * half_sine * half_sine, ln_mass, ln_kernel });
         }
     }
-    nodes
+    Ok(nodes)
 }
 
-fn spectrum(band_limit: usize, edges: &[f64], ln_kernel: impl Fn(f64) -> f64) -> Kernel {
-    let nodes = nodes(edges, ln_kernel);
+fn spectrum(
+    band_limit: usize,
+    edges: &[f64],
+    ln_kernel: impl Fn(f64) -> f64,
+    cancel: Cancel,
+) -> Result<Kernel, Cancelled> {
+    let nodes = nodes(edges, ln_kernel, cancel)?;
     let largest = nodes.iter().fold(f64::NEG_INFINITY, |a, node| a.max(node.ln_mass));
     let masses: Vec<f64> = nodes.iter().map(|node| libm::exp(node.ln_mass - largest)).collect();
     let total: f64 = masses.iter().sum();
@@ -150,12 +164,13 @@ fn spectrum(band_limit: usize, edges: &[f64], ln_kernel: impl Fn(f64) -> f64) ->
         .sum();
     let mut kappa = vec![0.0; band_limit + 1];
     for (nodes, masses) in nodes.chunks(LANES).zip(masses.chunks(LANES)) {
+        cancel.check()?;
         let one_minus_x = std::array::from_fn(|lane| nodes.get(lane).map_or(0.0, |node| node.one_minus_x));
         let mass = std::array::from_fn(|lane| masses.get(lane).map_or(0.0, |mass| mass / total));
         add_legendre_moments(&mut kappa, &one_minus_x, &mass);
     }
     kappa[0] = 1.0;
-    Kernel { kappa, ln_norm, energy: mean_of_kernel }
+    Ok(Kernel { kappa, ln_norm, energy: mean_of_kernel })
 }
 
 /// κ_l += Σ mass · P_l(x), by Bonnet's recursion in u = 1 − x for the differences δ_l = P_l − P_{l−1}:
@@ -177,8 +192,13 @@ fn add_legendre_moments(kappa: &mut [f64], one_minus_x: &[f64; LANES], mass: &[f
 
 #[cfg(test)]
 mod tests {
-    use super::{Kernel, kernel_charlie, kernel_ggx, kernel_lambert};
+    use super::{Kernel, kernel_charlie, kernel_lambert};
+    use crate::cancel::Cancel;
     use crate::testing::check_within;
+
+    fn kernel_ggx(alpha: f64, band_limit: usize) -> Kernel {
+        super::kernel_ggx(alpha, band_limit, Cancel::NEVER).expect("nobody cancels")
+    }
 
     /// Rows of an independent quadrature: see the file's first lines.
     const ORACLE: &str = include_str!("../tests/data/kernel_spectra.tsv");
@@ -186,7 +206,7 @@ mod tests {
     fn kernel(name: &str, alpha: f64, band_limit: usize) -> Kernel {
         match name {
             "ggx" => kernel_ggx(alpha, band_limit),
-            "charlie" => kernel_charlie(alpha, band_limit),
+            "charlie" => kernel_charlie(alpha, band_limit, Cancel::NEVER).expect("nobody cancels"),
             "lambert" => kernel_lambert(band_limit),
             other => panic!("unknown kernel {other}"),
         }

@@ -11,10 +11,13 @@
 //! split over independent outputs only, sums have a fixed order, transcendental functions come from `libm`,
 //! FFTs from rustfft's scalar plan.
 //!
+//! What can take long takes a [`Cancel`] last and returns [`Cancelled`] soon after it is set.
+//!
 //! Not here: image files and texel formats (`kiln-image`), reflectance (`kiln-brdf`), which bands and lobes
 //! an artefact needs (`kiln-bake`).
 
 mod analysis;
+mod cancel;
 pub mod direction;
 mod fft;
 mod harmonics;
@@ -29,12 +32,13 @@ mod testing;
 mod tests;
 mod world;
 
-pub use analysis::analyse;
+pub use analysis::{analyse, analyse_bytes};
+pub use cancel::{Bulk, Cancel, Cancelled};
 
 pub use direction::{
     cube_direction, cube_face_st, cube_texel_solid_angle_sr, panorama_direction, panorama_uv,
 };
 pub use harmonics::{Harmonics, coefficient_count};
 pub use kernel::{Kernel, ggx_kernel_at, kernel_charlie, kernel_ggx, kernel_lambert};
-pub use synthesis::{evaluate, synthesise_cube};
+pub use synthesis::{evaluate, synthesise_cube, synthesise_cube_bytes};
 pub use world::{real_harmonics, world_coefficients};

@@ -4,6 +4,7 @@
 //! on an 'exponential of semicircle' kernel", eq. 1.8; the choice of β for a low oversampling follows
 //! section 4.2 there (β = 0.976 π w (1 − 1/2σ)).
 
+use crate::cancel::{Cancel, Cancelled};
 use crate::quadrature::gauss_legendre;
 use std::f64::consts::PI;
 
@@ -47,7 +48,12 @@ impl Window {
     }
 
     /// 1 / (Fourier transform of the window at frequency k) for k = 0 … `highest`, on a grid of `period` points.
-    pub(crate) fn deconvolution(&self, highest: usize, period: usize) -> Vec<f64> {
+    pub(crate) fn deconvolution(
+        &self,
+        highest: usize,
+        period: usize,
+        cancel: Cancel,
+    ) -> Result<Vec<f64>, Cancelled> {
         let rule = gauss_legendre(40);
         let half = WIDTH as f64 / 2.0;
         let transform = |k: usize| -> f64 {
@@ -59,7 +65,7 @@ impl Window {
             };
             rule.iter().map(term).sum()
         };
-        (0..=highest).map(|k| 1.0 / transform(k)).collect()
+        (0..=highest).map(|k| cancel.check().map(|()| 1.0 / transform(k))).collect()
     }
 }
 

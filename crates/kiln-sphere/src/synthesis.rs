@@ -7,6 +7,7 @@
 //!    (a non-uniform FFT of type 2): 1e-8 of the function's size, see `spread`.
 
 use crate::analysis::ring_blocks;
+use crate::cancel::{Bulk, Cancel, Cancelled};
 use crate::direction::{cube_direction, cube_texel_centre};
 use crate::fft::{C64, Plan, bin, cis, even_fft_length};
 use crate::harmonics::{Coefficient, Harmonics};
@@ -20,18 +21,43 @@ use std::f64::consts::PI;
 ///
 /// `kappa` holds κ_0 … κ_L; degrees beyond it, or beyond the harmonics' band limit, are left out. Within about
 /// 1e-7 of the function's largest value of the exact sum ([`evaluate`]).
-pub fn synthesise_cube(harmonics: &Harmonics, kappa: &[f64], face_size: usize) -> Vec<f64> {
-    let grid = Grid::new(harmonics, kappa);
-    let mut rgb = vec![0.0; 6 * face_size * face_size * 3];
-    rgb.par_chunks_mut(face_size.max(1) * 3).enumerate().for_each(|(line, out)| {
+///
+/// # Errors
+/// [`Cancelled`] within the work of a block of rings, a grid row or a row of texels.
+pub fn synthesise_cube(
+    harmonics: &Harmonics,
+    kappa: &[f64],
+    face_size: usize,
+    cancel: Cancel,
+) -> Result<Bulk<Vec<f64>>, Cancelled> {
+    let grid = Grid::new(harmonics, kappa, cancel)?;
+    let mut rgb = Bulk::new(vec![0.0; 6 * face_size * face_size * 3]);
+    rgb.par_chunks_mut(face_size.max(1) * 3).enumerate().try_for_each(|(line, out)| {
+        cancel.check()?;
         let (face, y) = (line / face_size, line % face_size);
         let t = cube_texel_centre(face_size, y);
         for (x, texel) in out.chunks_exact_mut(3).enumerate() {
             let direction = cube_direction(face, cube_texel_centre(face_size, x), t);
             texel.copy_from_slice(&grid.interpolate(direction));
         }
-    });
-    rgb
+        Ok(())
+    })?;
+    Ok(rgb)
+}
+
+/// Memory that [`synthesise_cube`] takes at most, its result included, its input and some kilobytes a thread not.
+pub fn synthesise_cube_bytes(band_limit: usize, face_size: usize) -> usize {
+    let period = grid_period(band_limit);
+    let line_count = period / 2 + WIDTH;
+    let orders = (band_limit + 1) * line_count * size_of::<[C64; 3]>();
+    let grid = line_count * (period + WIDTH) * size_of::<[f64; 3]>();
+    orders + grid + 6 * face_size * face_size * size_of::<[f64; 3]>()
+}
+
+/// Grid points per full circle for degrees up to `band_limit`.
+fn grid_period(band_limit: usize) -> usize {
+    let least = libm::ceil((2 * band_limit + 2) as f64 * OVERSAMPLING) as usize;
+    even_fft_length(least.max(2 * WIDTH))
 }
 
 /// The function with coefficients κ_l a_lm in one direction, summed term by term: slow and exact up to rounding.
@@ -73,25 +99,27 @@ struct Grid {
     period: usize,
     /// Values per row: a period and the margins.
     stride: usize,
-    values: Vec<[f64; 3]>,
+    values: Bulk<Vec<[f64; 3]>>,
 }
 
 /// Rows and columns before the grid's origin: a window may start that far below its cell.
 const MARGIN: usize = WIDTH / 2 - 1;
 
 impl Grid {
-    fn new(harmonics: &Harmonics, kappa: &[f64]) -> Self {
+    fn new(harmonics: &Harmonics, kappa: &[f64], cancel: Cancel) -> Result<Self, Cancelled> {
         let band_limit = usable_band_limit(harmonics, kappa);
-        let least = libm::ceil((2 * band_limit + 2) as f64 * OVERSAMPLING) as usize;
-        let period = even_fft_length(least.max(2 * WIDTH));
+        let period = grid_period(band_limit);
         let window = Window::new();
-        let deconvolution = window.deconvolution(band_limit, period);
+        let deconvolution = window.deconvolution(band_limit, period, cancel)?;
         let columns = Columns::new(harmonics, kappa, period, &deconvolution);
-        let orders: Vec<Vec<[C64; 3]>> =
-            (0..=band_limit).into_par_iter().map(|m| columns.refine(m, &deconvolution)).collect();
+        let mut orders = Bulk::new(vec![Vec::new(); band_limit + 1]);
+        orders.par_iter_mut().enumerate().try_for_each(|(m, order)| {
+            *order = columns.refine(m, &deconvolution, cancel)?;
+            Ok(())
+        })?;
         let stride = period + WIDTH;
-        let values = rows(&orders, period, stride);
-        Self { window, period, stride, values }
+        let values = rows(&orders, period, stride, cancel)?;
+        Ok(Self { window, period, stride, values })
     }
 
     fn interpolate(&self, direction: [f64; 3]) -> [f64; 3] {
@@ -100,11 +128,12 @@ impl Grid {
         let (row, row_weights) = self.window.weights(theta * scale);
         let (column, column_weights) = self.window.weights(lambda * scale);
         let first = (row + MARGIN as isize) as usize * self.stride + (column + MARGIN as isize) as usize;
+        let values: &[[f64; 3]] = &self.values;
         let mut sum = [0.0; 3];
         for (line, row_weight) in row_weights.iter().enumerate() {
             let start = first + line * self.stride;
             let mut partial = [0.0; 3];
-            for (value, weight) in self.values[start..start + WIDTH].iter().zip(&column_weights) {
+            for (value, weight) in values[start..start + WIDTH].iter().zip(&column_weights) {
                 for (p, v) in partial.iter_mut().zip(value) {
                     *p += weight * v;
                 }
@@ -151,12 +180,13 @@ impl<'a> Columns<'a> {
     }
 
     /// F_m on the grid rows −MARGIN … period/2 + MARGIN, times what the rows' synthesis needs.
-    fn refine(&self, m: usize, deconvolution: &[f64]) -> Vec<[C64; 3]> {
-        let rings = self.on_rings(m);
+    fn refine(&self, m: usize, deconvolution: &[f64], cancel: Cancel) -> Result<Vec<[C64; 3]>, Cancelled> {
+        let rings = self.on_rings(m, cancel)?;
         let sign = if m.is_multiple_of(2) { 1.0 } else { -1.0 };
         let circle = 2 * self.ring_count;
         let mut result = vec![[C64::default(); 3]; self.period / 2 + WIDTH];
         for channel in 0..3 {
+            cancel.check()?;
             let mut coarse = vec![C64::default(); circle];
             for (n, ring) in rings.iter().enumerate() {
                 coarse[n] = C64::new(ring[2 * channel], ring[2 * channel + 1]);
@@ -175,11 +205,11 @@ impl<'a> Columns<'a> {
                 out[channel] = fine[bin(line as isize - MARGIN as isize, self.period)] * deconvolution[m];
             }
         }
-        result
+        Ok(result)
     }
 
     /// Σ_l κ_l a_lm P̄_lm(cos θ_n) on all rings, north to south.
-    fn on_rings(&self, m: usize) -> Vec<[f64; 6]> {
+    fn on_rings(&self, m: usize, cancel: Cancel) -> Result<Vec<[f64; 6]>, Cancelled> {
         let order = Order::new(m, self.band_limit);
         let degrees = self.harmonics.order(m).iter().zip(&self.kappa[m..=self.band_limit]);
         let mut scaled: Vec<Coefficient> = degrees.map(|(a, k)| a.map(|part| part * k)).collect();
@@ -190,6 +220,7 @@ impl<'a> Columns<'a> {
             if block.is_negligible(m, self.band_limit) {
                 continue;
             }
+            cancel.check()?;
             let mut parities = [[[0.0; 6]; LANES]; 2];
             order.for_each_batch(block, |first, legendre| {
                 let a: &[Coefficient; BATCH] = scaled[first..first + BATCH].try_into().expect("padded");
@@ -208,18 +239,24 @@ impl<'a> Columns<'a> {
                 rings[self.ring_count - 1 - first - lane] = std::array::from_fn(|i| even[i] - odd[i]);
             }
         }
-        rings
+        Ok(rings)
     }
 }
 
 /// Σ_m e^{imλ} F_m on every row's grid points, with wrapped margins.
-fn rows(orders: &[Vec<[C64; 3]>], period: usize, stride: usize) -> Vec<[f64; 3]> {
+fn rows(
+    orders: &[Vec<[C64; 3]>],
+    period: usize,
+    stride: usize,
+    cancel: Cancel,
+) -> Result<Bulk<Vec<[f64; 3]>>, Cancelled> {
     let plan = Plan::new(period).inverse;
     let line_count = period / 2 + WIDTH;
-    let mut values = vec![[0.0; 3]; line_count * stride];
-    values.par_chunks_mut(stride).enumerate().for_each_init(
+    let mut values = Bulk::new(vec![[0.0; 3]; line_count * stride]);
+    values.par_chunks_mut(stride).enumerate().try_for_each_init(
         || (vec![C64::default(); period], vec![C64::default(); period]),
         |(red_green, blue), (line, out)| {
+            cancel.check()?;
             red_green.fill(C64::default());
             blue.fill(C64::default());
             for (m, order) in orders.iter().enumerate() {
@@ -243,7 +280,8 @@ fn rows(orders: &[Vec<[C64; 3]>], period: usize, stride: usize) -> Vec<[f64; 3]>
                 let j = bin(column as isize - MARGIN as isize, period);
                 *out = [red_green[j].re, red_green[j].im, blue[j].re];
             }
+            Ok(())
         },
-    );
-    values
+    )?;
+    Ok(values)
 }

@@ -1,7 +1,7 @@
 //! Panoramas and checks the tests share.
 
-use crate::{Prefiltered, reference_radiance};
-use kiln_image::{Image, Panorama};
+use crate::{Analysis, AnalysisRequest, Cancel, EncodedLevel, Prefiltered, TexelFormat, reference_radiance};
+use kiln_image::{Cube, Image, Panorama};
 use kiln_sphere::direction::cube_texel_centre;
 use kiln_sphere::{cube_direction, cube_texel_solid_angle_sr};
 
@@ -10,6 +10,32 @@ use kiln_sphere::{cube_direction, cube_texel_solid_angle_sr};
 pub(super) fn check_within(what: &str, actual: f64, expected: f64, tol: f64) {
     let error = (actual - expected).abs();
     assert!(error <= tol, "{what}: got {actual}, want {expected}, error {error} over {tol}");
+}
+
+const WANTED: &str = "nobody cancels";
+
+pub(super) fn analyse(panorama: &Panorama, request: &AnalysisRequest) -> Analysis {
+    crate::analyse(panorama, request, Cancel::NEVER).expect(WANTED)
+}
+
+pub(super) fn bytes_of(analysis: &Analysis) -> Vec<u8> {
+    analysis.to_bytes(Cancel::NEVER).expect(WANTED)
+}
+
+pub(super) fn specular_level(analysis: &Analysis, alpha: f64, face_size: usize) -> Prefiltered {
+    crate::specular_level(analysis, alpha, face_size, Cancel::NEVER).expect(WANTED)
+}
+
+pub(super) fn irradiance(analysis: &Analysis, face_size: usize) -> Prefiltered {
+    crate::irradiance(analysis, face_size, Cancel::NEVER).expect(WANTED)
+}
+
+pub(super) fn skybox(panorama: &Panorama, face_size: usize) -> Vec<Cube> {
+    crate::skybox(panorama, face_size, Cancel::NEVER).expect(WANTED)
+}
+
+pub(super) fn encode_level(cube: &Cube, format: TexelFormat, scale_log2: i32) -> EncodedLevel {
+    crate::encode_level(cube, format, scale_log2, Cancel::NEVER).expect(WANTED)
 }
 
 pub(super) fn panorama(width: usize, height: usize, texel: impl FnMut(usize) -> [f32; 3]) -> Panorama {

@@ -1,9 +1,10 @@
 //! Sky boxes, harmonics, tables, texel bytes.
 
-use super::environments::{check_within, panorama, random, sun, texel_solid_angle_sr};
+use super::environments::{
+    analyse, check_within, encode_level, panorama, random, skybox, sun, texel_solid_angle_sr,
+};
 use crate::{
-    AnalysisRequest, TexelFormat, analyse, dfg_table, encode_level, irradiance_sh, roughness_of_level,
-    scale_log2, sh, skybox,
+    AnalysisRequest, Cancel, TexelFormat, dfg_table, irradiance_sh, roughness_of_level, scale_log2, sh,
 };
 use kiln_image::{Cube, Panorama};
 use std::f64::consts::PI;
@@ -122,7 +123,7 @@ fn roughness_runs_from_0_to_1_and_a_chain_of_one_is_legal() {
 #[test]
 fn dfg_table_agrees_with_the_integral() {
     let size = 8;
-    let table = dfg_table(size);
+    let table = dfg_table(size, Cancel::NEVER).expect("nobody cancels");
     assert_eq!(table.len(), 64);
     for (index, entry) in table.iter().enumerate() {
         let centre = |i: usize| (i as f64 + 0.5) / 8.0;

@@ -1,7 +1,10 @@
 //! Prefiltered maps.
 
-use super::environments::{check_within, measured_rms, panorama, random, sun, texel_direction};
-use crate::{Analysis, AnalysisRequest, BakeError, analyse, irradiance, reference_radiance, specular_level};
+use super::environments::{
+    analyse, bytes_of, check_within, irradiance, measured_rms, panorama, random, specular_level, sun,
+    texel_direction,
+};
+use crate::{Analysis, AnalysisRequest, BakeError, Cancel, reference_radiance};
 use kiln_image::Panorama;
 use kiln_sphere::{ggx_kernel_at, kernel_ggx, panorama_direction, panorama_uv};
 
@@ -67,7 +70,7 @@ fn single_texel_gives_the_kernel_itself() {
     let solid_angle_sr = 4.0 * std::f64::consts::PI * analysis.mean()[0] * 4e-3 / 4.0;
     for alpha in [0.25, 1.0] {
         let level = specular_level(&analysis, alpha, 8);
-        let norm = kernel_ggx(alpha, 0).ln_norm.exp();
+        let norm = kernel_ggx(alpha, 0, Cancel::NEVER).expect("nobody cancels").ln_norm.exp();
         let peak = ggx_kernel_at(alpha, 0.0) / norm * solid_angle_sr * 1000.0;
         for (i, texel) in level.cube.rgb.chunks_exact(3).enumerate() {
             let direction = texel_direction(8, i);
@@ -133,12 +136,12 @@ fn equal_bytes_for_any_number_of_threads() {
         pool.install(|| {
             let analysis = analyse(&map, &REQUEST);
             let cube = specular_level(&analysis, 0.05, 16).cube;
-            (analysis.to_bytes(), cube.rgb.iter().map(|value| value.to_bits()).collect::<Vec<_>>())
+            (bytes_of(&analysis), cube.rgb.iter().map(|value| value.to_bits()).collect::<Vec<_>>())
         })
     };
     let one = bake(1);
     assert!(one == bake(2) && one == bake(7), "thread count changed bytes");
-    assert!(one.0 != analyse(&random(64, 32, 14), &REQUEST).to_bytes(), "another map has other bytes");
+    assert!(one.0 != bytes_of(&analyse(&random(64, 32, 14), &REQUEST)), "another map has other bytes");
 }
 
 #[test]
@@ -153,7 +156,10 @@ fn extreme_alphas_are_finite() {
 #[test]
 fn impossible_error_is_capped_and_said() {
     let request = AnalysisRequest { alpha_min: 0.0, error: 0.0 };
-    assert_eq!(crate::analysis::choose_band_limit(&request, [1.0; 3], 20.0), crate::BAND_LIMIT_MAX);
+    assert_eq!(
+        crate::analysis::choose_band_limit(&request, [1.0; 3], 20.0, Cancel::NEVER),
+        Ok(crate::BAND_LIMIT_MAX)
+    );
     let analysis = analyse(&random(32, 16, 3), &AnalysisRequest { alpha_min: 0.25, error: 1e-3 });
     let sharper = specular_level(&analysis, 0.001, 2);
     assert!(sharper.accuracy.rms_bound > 0.01, "{:?}", sharper.accuracy);
@@ -169,18 +175,21 @@ fn irradiance_is_alpha_one() {
 #[test]
 fn analysis_survives_its_bytes_and_hostile_ones_do_not() {
     let analysis = analyse(&sun(16, 8, 3), &AnalysisRequest { alpha_min: 0.5, error: 1e-2 });
-    let bytes = analysis.to_bytes();
-    assert_eq!(Analysis::from_bytes(&bytes), Ok(analysis));
+    let bytes = bytes_of(&analysis);
+    assert_eq!(Analysis::from_bytes(&bytes, Cancel::NEVER), Ok(analysis));
     for length in 0..bytes.len().min(200) {
-        assert!(Analysis::from_bytes(&bytes[..length]).is_err(), "{length} bytes");
+        assert!(Analysis::from_bytes(&bytes[..length], Cancel::NEVER).is_err(), "{length} bytes");
     }
-    assert_eq!(Analysis::from_bytes(b"PNG"), Err(BakeError::NotAnAnalysis));
+    assert_eq!(Analysis::from_bytes(b"PNG", Cancel::NEVER), Err(BakeError::NotAnAnalysis));
     let mut huge = bytes.clone();
     huge[16..20].copy_from_slice(&u32::MAX.to_le_bytes());
-    assert!(matches!(Analysis::from_bytes(&huge), Err(BakeError::Range { field: "band limit", .. })));
+    assert!(matches!(
+        Analysis::from_bytes(&huge, Cancel::NEVER),
+        Err(BakeError::Range { field: "band limit", .. })
+    ));
     let mut nan = bytes.clone();
     nan[28..36].copy_from_slice(&f64::NAN.to_le_bytes());
-    assert_eq!(Analysis::from_bytes(&nan), Err(BakeError::NotFinite { index: 0 }));
+    assert_eq!(Analysis::from_bytes(&nan, Cancel::NEVER), Err(BakeError::NotFinite { index: 0 }));
 }
 
 /// The panorama of a corpus file, unless there is no corpus.
@@ -192,7 +201,8 @@ fn corpus(file: &str) -> Option<Panorama> {
     };
     let path = std::path::Path::new(&root).join(file);
     let bytes = std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-    let decoded = kiln_image::decode(&bytes, &kiln_image::Limits::default()).expect("a readable panorama");
+    let decoded = kiln_image::decode(&bytes, &kiln_image::Limits::default(), Cancel::NEVER)
+        .expect("a readable panorama");
     Some(Panorama::new(decoded.image).expect("2:1"))
 }
 

@@ -12,9 +12,9 @@ mod scanline;
 
 pub use encode::encode;
 
-use crate::{DecodeError, Decoded, Image, Limits, colour, decode::check_size};
+use crate::{Bulk, Cancel, Cancelled, DecodeError, Decoded, Image, Limits, colour, decode::check_size};
 use header::{Axis, Header, Orientation, PixelFormat};
-use scanline::Reader;
+use scanline::{Reader, line_bytes_min};
 
 /// The format's name in messages.
 pub(crate) const FORMAT: &str = "Radiance HDR";
@@ -30,28 +30,33 @@ const WHITE_EFFICACY: f64 = 179.0;
 /// either form.
 ///
 /// # Errors
-/// [`DecodeError`] with header line, row and byte.
-pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Decoded, DecodeError> {
+/// [`DecodeError`] with header line, row and byte; [`DecodeError::Cancelled`] within a row's work.
+pub fn decode(bytes: &[u8], limits: &Limits, cancel: Cancel) -> Result<Decoded, DecodeError> {
     let header = header::parse(bytes)?;
     let orientation = header.orientation;
     let (width, height) = orientation.image_size();
     check_size(FORMAT, width, height, limits)?;
-    let stored = read_scanlines(bytes, &header)?;
-    let mut rgb = orientation.upright(stored);
+    let stored = read_scanlines(bytes, &header, cancel)?;
+    let mut rgb = orientation.upright(stored, cancel)?;
     let mut notes = header.notes.clone();
-    undo_exposure(&header, &mut rgb, &mut notes);
-    convert_colour(&header, &mut rgb, &mut notes)?;
-    Ok(Decoded { image: Image::new(width, height, rgb)?, format: FORMAT, notes })
+    undo_exposure(&header, &mut rgb, &mut notes, cancel)?;
+    convert_colour(&header, &mut rgb, &mut notes, cancel)?;
+    Ok(Decoded { image: Image::new(width, height, rgb.into_inner())?, format: FORMAT, notes })
 }
 
-/// Reads in file order. Memory grows with what the bytes yield, not with what the header claims.
-fn read_scanlines(bytes: &[u8], header: &Header) -> Result<Vec<f32>, DecodeError> {
+/// Reads in file order. Memory grows with what the bytes yield, not with what the header claims, unless the bytes are
+/// enough for the claim: growing means copying, which cannot be interrupted.
+fn read_scanlines(bytes: &[u8], header: &Header, cancel: Cancel) -> Result<Bulk<Vec<f32>>, DecodeError> {
     let Orientation { slow, fast, .. } = header.orientation;
     let scale = exponent_scale();
     let mut reader = Reader::new(bytes, header.pixels_start);
     let mut line = vec![[0_u8; 4]; fast.length];
-    let mut rgb = Vec::new();
+    let has_enough =
+        bytes.len() - header.pixels_start >= slow.length.saturating_mul(line_bytes_min(fast.length));
+    let value_count = if has_enough { slow.length * fast.length * 3 } else { 0 };
+    let mut rgb = Bulk::new(Vec::with_capacity(value_count));
     for row in 0..slow.length {
+        cancel.check()?;
         reader.read_line(row, &mut line)?;
         rgb.extend(line.iter().flat_map(|&[r, g, b, e]| {
             let scale = scale[usize::from(e)];
@@ -66,23 +71,29 @@ fn exponent_scale() -> [f32; 256] {
     std::array::from_fn(|e| if e == 0 { 0.0 } else { libm::ldexp(1.0, e as i32 - 136) as f32 })
 }
 
-fn undo_exposure(header: &Header, rgb: &mut [f32], notes: &mut Vec<String>) {
+fn undo_exposure(
+    header: &Header,
+    rgb: &mut [f32],
+    notes: &mut Vec<String>,
+    cancel: Cancel,
+) -> Result<(), Cancelled> {
     let factor = header.colour_correction.map(|correction| 1.0 / (header.exposure * correction));
     if factor == [1.0; 3] {
-        return;
+        return Ok(());
     }
     notes.push(format!(
         "EXPOSURE {} and COLORCORR {:?} were undone",
         header.exposure, header.colour_correction
     ));
-    for texel in rgb.chunks_exact_mut(3) {
-        for (value, factor) in texel.iter_mut().zip(factor) {
-            *value = (f64::from(*value) * factor) as f32;
-        }
-    }
+    colour::change_texels(rgb, |[r, g, b]| [r * factor[0], g * factor[1], b * factor[2]], cancel)
 }
 
-fn convert_colour(header: &Header, rgb: &mut [f32], notes: &mut Vec<String>) -> Result<(), DecodeError> {
+fn convert_colour(
+    header: &Header,
+    rgb: &mut [f32],
+    notes: &mut Vec<String>,
+    cancel: Cancel,
+) -> Result<(), DecodeError> {
     let (source, divisor) = match (header.pixel_format, header.primaries) {
         (PixelFormat::Xyze, _) => {
             notes.push(
@@ -102,8 +113,7 @@ fn convert_colour(header: &Header, rgb: &mut [f32], notes: &mut Vec<String>) -> 
         place: "PRIMARIES".to_owned(),
         reason: format!("{:?} span no colour space", source.to_array()),
     })?;
-    colour::transform_texels(&matrix.map(|row| row.map(|value| value / divisor)), rgb);
-    Ok(())
+    Ok(colour::transform_texels(&matrix.map(|row| row.map(|value| value / divisor)), rgb, cancel)?)
 }
 
 impl Orientation {
@@ -117,22 +127,25 @@ impl Orientation {
     }
 
     /// Reorders texels from file order to rows from the top, columns from the left.
-    fn upright(self, stored: Vec<f32>) -> Vec<f32> {
+    fn upright(self, stored: Bulk<Vec<f32>>, cancel: Cancel) -> Result<Bulk<Vec<f32>>, Cancelled> {
         let (width, height) = self.image_size();
         let (x_axis, y_axis) =
             if self.is_transposed { (self.slow, self.fast) } else { (self.fast, self.slow) };
         if !self.is_transposed && !x_axis.is_reversed && !y_axis.is_reversed {
-            return stored;
+            return Ok(stored);
         }
-        let mut rgb = Vec::with_capacity(stored.len());
+        let stored: &[f32] = &stored;
+        let mut rgb = Bulk::new(Vec::with_capacity(stored.len()));
         for y in 0..height {
+            cancel.check()?;
+            let rgb: &mut Vec<f32> = &mut rgb;
             for x in 0..width {
                 let (u, v) = (x_axis.stored_index(x), y_axis.stored_index(y));
                 let index = if self.is_transposed { u * height + v } else { v * width + u };
                 rgb.extend_from_slice(&stored[3 * index..3 * index + 3]);
             }
         }
-        rgb
+        Ok(rgb)
     }
 }
 

@@ -9,6 +9,11 @@ pub(super) const NEW_RLE_WIDTHS: std::ops::RangeInclusive<usize> = 8..=32767;
 /// A texel as stored: three mantissas, one exponent.
 pub(super) type Rgbe = [u8; 4];
 
+/// Fewest bytes of a line in the newer run-length form: two for each run of up to 127 texels, of four components.
+pub(super) fn line_bytes_min(length: usize) -> usize {
+    4 + 4 * 2 * length.div_ceil(127)
+}
+
 /// Walks through the pixel bytes.
 pub(super) struct Reader<'a> {
     bytes: &'a [u8],

@@ -1,5 +1,6 @@
 //! Which channels are colour.
 
+use crate::{Cancel, Cancelled, colour};
 use exr::meta::{
     attribute::{ChannelDescription, SampleType},
     header::Header,
@@ -79,13 +80,16 @@ impl ColourChannels {
 /// Turns (RY, Y, BY) into (R, G, B): RY = (R − Y)/Y, BY = (B − Y)/Y, Y = w · (R, G, B).
 ///
 /// Source: "Technical Introduction to OpenEXR", Luminance/Chroma Images.
-pub(super) fn undo_luminance_chroma(texels: &mut [f32], weights: [f64; 3]) {
-    for texel in texels.chunks_exact_mut(3) {
-        let [ry, y, by] = [texel[0], texel[1], texel[2]].map(f64::from);
+pub(super) fn undo_luminance_chroma(
+    texels: &mut [f32],
+    weights: [f64; 3],
+    cancel: Cancel,
+) -> Result<(), Cancelled> {
+    let to_rgb = |[ry, y, by]: [f64; 3]| {
         let (r, b) = ((ry + 1.0) * y, (by + 1.0) * y);
-        let g = (y - weights[0] * r - weights[2] * b) / weights[1];
-        texel.copy_from_slice(&[r as f32, g as f32, b as f32]);
-    }
+        [r, (y - weights[0] * r - weights[2] * b) / weights[1], b]
+    };
+    colour::change_texels(texels, to_rgb, cancel)
 }
 
 fn is_integer(channel: &ChannelDescription) -> bool {

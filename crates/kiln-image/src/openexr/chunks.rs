@@ -1,7 +1,7 @@
 //! From chunk offsets to texels.
 
 use super::{FORMAT, channels::ColourChannels, explain, invalid};
-use crate::DecodeError;
+use crate::{Bulk, Cancel, Cancelled, DecodeError};
 use exr::{
     block::{
         UncompressedBlock,
@@ -22,20 +22,25 @@ pub(super) fn read_part(
     part: usize,
     tables_start: usize,
     channels: &ColourChannels,
-) -> Result<Vec<f32>, DecodeError> {
+    cancel: Cancel,
+) -> Result<Bulk<Vec<f32>>, DecodeError> {
     let header = &meta.headers[part];
     let skipped: usize = meta.headers[..part].iter().map(|header| header.chunk_count).sum();
     let (block, size) = (header.max_block_pixel_size(), header.layer_size);
     // The largest level stands first in the table, whatever levels follow.
     let count = compute_block_count(size.0, block.0) * compute_block_count(size.1, block.1);
     let chunks = (0..count)
-        .map(|index| locate_chunk(bytes, meta, part, tables_start + (skipped + index) * 8, index))
+        .map(|index| {
+            cancel.check()?;
+            locate_chunk(bytes, meta, part, tables_start + (skipped + index) * 8, index)
+        })
         .collect::<Result<Vec<_>, _>>()?;
 
-    let mut target = Target { channels, width: size.0, rgb: vec![0.0; size.0 * size.1 * 3] };
+    let mut target = Target { channels, width: size.0, rgb: Bulk::new(vec![0.0; size.0 * size.1 * 3]) };
     let mut is_filled = vec![false; count];
     let columns = compute_block_count(size.0, block.0);
     for (index, chunk) in chunks.into_iter().enumerate() {
+        cancel.check()?;
         let chunk = chunk.compressed(bytes, part);
         let block_data = UncompressedBlock::decompress_chunk(chunk, meta, false)
             .map_err(|error| explain(error, &format!("chunk {index} of {count}"), bytes.len()))?;
@@ -44,7 +49,7 @@ pub(super) fn read_part(
         if block_data.index.level != Vec2(0, 0) || slot.is_none_or(|slot| std::mem::replace(slot, true)) {
             return Err(invalid(format!("chunk {index} of {count}"), "it is stored twice".to_owned()));
         }
-        target.write(&block_data, meta, part);
+        target.write(&block_data, meta, part, cancel)?;
     }
     Ok(target.rgb)
 }
@@ -125,14 +130,21 @@ impl Located {
 struct Target<'a> {
     channels: &'a ColourChannels,
     width: usize,
-    rgb: Vec<f32>,
+    rgb: Bulk<Vec<f32>>,
 }
 
 impl Target<'_> {
     /// Spreads a block's lines (one channel each) over the interleaved texels.
-    fn write(&mut self, block: &UncompressedBlock, meta: &MetaData, part: usize) {
+    fn write(
+        &mut self,
+        block: &UncompressedBlock,
+        meta: &MetaData,
+        part: usize,
+        cancel: Cancel,
+    ) -> Result<(), Cancelled> {
         let list = &meta.headers[part].channels;
         for line in block.lines(list) {
+            cancel.check()?;
             let sources = self.channels.sources;
             for (component, _) in
                 sources.iter().enumerate().filter(|(_, s)| **s == Some(line.location.channel))
@@ -143,6 +155,7 @@ impl Target<'_> {
                 copy_samples(list.list[line.location.channel].sample_type, line.value, texels);
             }
         }
+        Ok(())
     }
 }
 

@@ -11,7 +11,7 @@ mod channels;
 mod chunks;
 
 use crate::{
-    DecodeError, Decoded, Image, Limits,
+    Bulk, Cancel, DecodeError, Decoded, Image, Limits,
     colour::{self, Chromaticities},
     decode::{check_size, guard, too_large},
 };
@@ -32,12 +32,12 @@ const CHUNK_BYTES_MAX: usize = 1 << 30;
 /// Decodes the first part that holds colour.
 ///
 /// # Errors
-/// [`DecodeError`] with part or chunk.
-pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Decoded, DecodeError> {
-    guard(FORMAT, || decode_unguarded(bytes, limits))
+/// [`DecodeError`] with part or chunk; [`DecodeError::Cancelled`] after the chunk in work.
+pub(crate) fn decode(bytes: &[u8], limits: &Limits, cancel: Cancel) -> Result<Decoded, DecodeError> {
+    guard(FORMAT, || decode_unguarded(bytes, limits, cancel))
 }
 
-fn decode_unguarded(bytes: &[u8], limits: &Limits) -> Result<Decoded, DecodeError> {
+fn decode_unguarded(bytes: &[u8], limits: &Limits, cancel: Cancel) -> Result<Decoded, DecodeError> {
     let (meta, chunk_tables_start) = read_meta(bytes)?;
     check_tables(&meta, bytes.len(), chunk_tables_start, limits)?;
     let (part, channels) = choose_part(&meta)?;
@@ -45,9 +45,9 @@ fn decode_unguarded(bytes: &[u8], limits: &Limits) -> Result<Decoded, DecodeErro
     check_part(header, limits)?;
 
     let mut notes = part_notes(&meta, part, &channels);
-    let mut rgb = chunks::read_part(bytes, &meta, part, chunk_tables_start, &channels)?;
-    convert_colour(header, &mut rgb, &channels, &mut notes)?;
-    let image = place(header, rgb, limits, &mut notes)?;
+    let mut rgb = chunks::read_part(bytes, &meta, part, chunk_tables_start, &channels, cancel)?;
+    convert_colour(header, &mut rgb, &channels, &mut notes, cancel)?;
+    let image = place(header, rgb, limits, &mut notes, cancel)?;
     Ok(Decoded { image, format: FORMAT, notes })
 }
 
@@ -158,12 +158,14 @@ fn convert_colour(
     rgb: &mut [f32],
     channels: &ColourChannels,
     notes: &mut Vec<String>,
+    cancel: Cancel,
 ) -> Result<(), DecodeError> {
     let source = chromaticities(header).unwrap_or(colour::REC_709);
     let no_space =
         || invalid("chromaticities".to_owned(), format!("{:?} span no colour space", source.to_array()));
     if channels.has_chroma {
-        channels::undo_luminance_chroma(rgb, colour::luminance_weights(source).ok_or_else(no_space)?);
+        let weights = colour::luminance_weights(source).ok_or_else(no_space)?;
+        channels::undo_luminance_chroma(rgb, weights, cancel)?;
     }
     if channels.is_grey || source.is_close_to(colour::REC_709) {
         return Ok(());
@@ -174,7 +176,7 @@ fn convert_colour(
     } else {
         colour::to_rec_709(source)
     };
-    colour::transform_texels(&matrix.ok_or_else(no_space)?, rgb);
+    colour::transform_texels(&matrix.ok_or_else(no_space)?, rgb, cancel)?;
     notes.push(format!("chromaticities {:?} were converted to Rec. 709", source.to_array()));
     Ok(())
 }
@@ -182,15 +184,16 @@ fn convert_colour(
 /// Puts the data window where the display window is; what was not stored is black.
 fn place(
     header: &Header,
-    rgb: Vec<f32>,
+    rgb: Bulk<Vec<f32>>,
     limits: &Limits,
     notes: &mut Vec<String>,
+    cancel: Cancel,
 ) -> Result<Image, DecodeError> {
     let (width, height) = (header.layer_size.0, header.layer_size.1);
     let data = header.data_window();
     let display = header.shared_attributes.display_window;
     if display == data {
-        return Ok(Image::new(width, height, rgb)?);
+        return Ok(Image::new(width, height, rgb.into_inner())?);
     }
     check_size(FORMAT, display.size.0, display.size.1, limits)?;
     let columns = Overlap::new(data.position.0, width, display.position.0, display.size.0);
@@ -204,13 +207,14 @@ fn place(
         describe(data),
         describe(display)
     ));
-    let mut out = vec![0.0; display.size.0 * display.size.1 * 3];
+    let mut out = Bulk::new(vec![0.0; display.size.0 * display.size.1 * 3]);
     for row in 0..rows.length {
+        cancel.check()?;
         let from = ((rows.data_start + row) * width + columns.data_start) * 3;
         let to = ((rows.display_start + row) * display.size.0 + columns.display_start) * 3;
         out[to..to + columns.length * 3].copy_from_slice(&rgb[from..from + columns.length * 3]);
     }
-    Ok(Image::new(display.size.0, display.size.1, out)?)
+    Ok(Image::new(display.size.0, display.size.1, out.into_inner())?)
 }
 
 /// The common part of two intervals, in the coordinates of each.

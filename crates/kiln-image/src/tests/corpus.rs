@@ -1,7 +1,7 @@
 //! Every real file against what independent readers saw in it.
 
-use super::{corpus, decode_default};
-use crate::{DecodeError, Decoded, check_texels, colour::luminance};
+use super::{check_texels, corpus, decode_default};
+use crate::{DecodeError, Decoded, colour::luminance};
 use std::{
     path::{Path, PathBuf},
     time::{Duration, Instant},

@@ -1,7 +1,7 @@
 //! EXR files written here, each for one case the corpus lacks.
 
 use super::{check_within, decode_default};
-use crate::{DecodeError, Limits, decode};
+use crate::{Cancel, DecodeError, Limits, decode};
 use exr::{
     image::{AnyChannel, AnyChannels, FlatSamples, Image, Layer, Layers},
     math::Vec2,
@@ -112,10 +112,18 @@ fn limits_hold_for_size_and_channels_and_parts() {
         Limits { channels_max: 2, ..Limits::default() },
         Limits { parts_max: 0, ..Limits::default() },
     ] {
-        assert!(matches!(decode(&one, &limits), Err(DecodeError::TooLarge { .. })), "{limits:?}");
+        assert!(
+            matches!(decode(&one, &limits, Cancel::NEVER), Err(DecodeError::TooLarge { .. })),
+            "{limits:?}"
+        );
     }
     assert!(
-        decode(&one, &Limits { width_max: 2, texels_max: 2, channels_max: 3, ..Limits::default() }).is_ok()
+        decode(
+            &one,
+            &Limits { width_max: 2, texels_max: 2, channels_max: 3, ..Limits::default() },
+            Cancel::NEVER
+        )
+        .is_ok()
     );
 }
 

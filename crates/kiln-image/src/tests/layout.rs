@@ -1,7 +1,7 @@
 //! Sizes that are images and sizes that are not; sniffing.
 
 use super::decode_default;
-use crate::{Cube, DecodeError, Image, LayoutError, Limits, Panorama, decode, hdr, png};
+use crate::{Cancel, Cube, DecodeError, Image, LayoutError, Limits, Panorama, decode, hdr, png};
 
 #[test]
 fn panorama_accepts_two_to_one_only() {
@@ -56,10 +56,13 @@ fn limits_hold_for_every_format() {
             Limits { height_max: 19, ..Limits::default() },
             Limits { texels_max: 799, ..Limits::default() },
         ] {
-            assert!(matches!(decode(&bytes, &limits), Err(DecodeError::TooLarge { .. })), "{limits:?}");
+            assert!(
+                matches!(decode(&bytes, &limits, Cancel::NEVER), Err(DecodeError::TooLarge { .. })),
+                "{limits:?}"
+            );
         }
         let exact = Limits { width_max: 40, height_max: 20, texels_max: 800, ..Limits::default() };
-        assert!(decode(&bytes, &exact).is_ok());
+        assert!(decode(&bytes, &exact, Cancel::NEVER).is_ok());
     }
 }
 

@@ -1,5 +1,6 @@
 //! Tests of the crate, by topic.
 
+mod cancel;
 mod colour;
 mod corpus;
 mod corpus_orientation;
@@ -11,11 +12,15 @@ mod mutation;
 mod sheet;
 mod texels;
 
-use crate::{DecodeError, Decoded, Limits, decode};
+use crate::{Cancel, DecodeError, Decoded, Image, Limits, TexelReport, decode};
 
 /// Decodes with default limits.
 fn decode_default(bytes: &[u8]) -> Result<Decoded, DecodeError> {
-    decode(bytes, &Limits::default())
+    decode(bytes, &Limits::default(), Cancel::NEVER)
+}
+
+fn check_texels(image: &Image) -> TexelReport {
+    crate::check_texels(image, Cancel::NEVER).expect("nobody cancels")
 }
 
 /// Passes only when `|actual - expected| <= tol`; written with `<=`, so NaN fails.

@@ -1,7 +1,7 @@
 //! Seeded damage: decoders answer, they never panic, hang or return what was not asked for.
 
 use super::Random;
-use crate::{Image, Limits, decode, hdr, ktx2, png};
+use crate::{Cancel, Image, Limits, decode, hdr, ktx2, png};
 use exr::prelude::*;
 use std::time::{Duration, Instant};
 
@@ -74,11 +74,11 @@ fn mutants_decode_within_limits_or_are_refused() {
     let (mut decoded, mut refused) = (0, 0);
     let mut slowest = Duration::ZERO;
     for file in files() {
-        assert!(decode(&file, &LIMITS).is_ok(), "the sound file decodes");
+        assert!(decode(&file, &LIMITS, Cancel::NEVER).is_ok(), "the sound file decodes");
         for _ in 0..MUTANTS {
             let mutant = mutate(&file, &mut random);
             let start = Instant::now();
-            match decode(&mutant, &LIMITS) {
+            match decode(&mutant, &LIMITS, Cancel::NEVER) {
                 Err(_) => refused += 1,
                 Ok(result) => {
                     let image = result.image;

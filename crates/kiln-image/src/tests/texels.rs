@@ -1,7 +1,11 @@
 //! Reports and repairs.
 
-use super::check_within;
-use crate::{Image, TexelPolicy, check_texels, repair_texels};
+use super::{check_texels, check_within};
+use crate::{Cancel, Image, Repair, TexelError, TexelPolicy};
+
+fn repair_texels(image: &mut Image) -> Repair {
+    crate::repair_texels(image, Cancel::NEVER).expect("nobody cancels")
+}
 
 fn grey(width: usize, height: usize, value: f32) -> Image {
     Image::new(width, height, vec![value; width * height * 3]).expect("values fit")
@@ -36,7 +40,7 @@ fn sound_image_is_radiance_and_no_policy_changes_it() {
     check_within("mean luminance", check_texels(&image).mean_luminance, 0.25, 1e-12);
     for policy in [TexelPolicy::Repair, TexelPolicy::Error, TexelPolicy::Keep] {
         let mut copy = image.clone();
-        assert_eq!(policy.apply(&mut copy).expect("nothing is wrong").flux_moved, 0.0);
+        assert_eq!(policy.apply(&mut copy, Cancel::NEVER).expect("nothing is wrong").flux_moved, 0.0);
         assert_eq!(copy, image);
     }
 }
@@ -45,10 +49,11 @@ fn sound_image_is_radiance_and_no_policy_changes_it() {
 fn error_policy_names_the_texel_and_keep_keeps() {
     let mut image = grey(4, 2, 1.0);
     image.rgb[3 * 5 + 1] = f32::NAN;
-    let error = TexelPolicy::Error.apply(&mut image).expect_err("a NaN");
-    assert_eq!((error.place.x, error.place.y, error.place.channel), (1, 1, 1));
+    let error = TexelPolicy::Error.apply(&mut image, Cancel::NEVER).expect_err("a NaN");
+    let TexelError::NoRadiance { place, .. } = error else { panic!("{error}") };
+    assert_eq!((place.x, place.y, place.channel), (1, 1, 1));
     assert!(error.to_string().contains("(1, 1)"), "{error}");
-    TexelPolicy::Keep.apply(&mut image).expect("keeping never fails");
+    TexelPolicy::Keep.apply(&mut image, Cancel::NEVER).expect("keeping never fails");
     assert!(image.rgb[16].is_nan());
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use image::RgbaImage;
-use kiln_bake::{AnalysisRequest, TexelFormat, encode_level, scale_log2};
+use kiln_bake::{AnalysisRequest, Cancel, TexelFormat, encode_level, scale_log2};
 use kiln_image::{Cube, Limits, Panorama};
 use serde_json::json;
 
@@ -14,6 +14,7 @@ use crate::HeadlessViewer;
 
 const SPECULAR_SIZE: usize = 128;
 const SPECULAR_LEVELS: usize = 6;
+const WANTED: &str = "nobody cancels";
 
 #[expect(clippy::print_stderr, reason = "a skipped test says so, a measured one what it measured")]
 fn say(text: &str) {
@@ -31,19 +32,22 @@ fn corpus() -> Option<PathBuf> {
 /// Bakes a panorama into `env/NAME/…`, as the pipeline does.
 fn bake(build: &mut Build, name: &str, path: &Path) {
     let bytes = std::fs::read(path).expect("the corpus has it");
-    let decoded = kiln_image::decode(&bytes, &Limits::default()).expect("it is sound");
+    let decoded = kiln_image::decode(&bytes, &Limits::default(), Cancel::NEVER).expect("it is sound");
     let panorama = Panorama::new(decoded.image).expect("it is twice as wide as high");
     let request = AnalysisRequest { alpha_min: (1.0 / (SPECULAR_LEVELS - 1) as f64).powi(2), error: 1e-3 };
-    let analysis = kiln_bake::analyse(&panorama, &request);
-    let mirror = kiln_bake::skybox(&panorama, SPECULAR_SIZE).swap_remove(0);
+    let analysis = kiln_bake::analyse(&panorama, &request, Cancel::NEVER).expect(WANTED);
+    let skybox = |size: usize| kiln_bake::skybox(&panorama, size, Cancel::NEVER).expect(WANTED);
+    let mirror = skybox(SPECULAR_SIZE).swap_remove(0);
     let level = |level: usize| {
         let roughness = kiln_bake::roughness_of_level(level, SPECULAR_LEVELS);
-        kiln_bake::specular_level(&analysis, roughness * roughness, SPECULAR_SIZE >> level).cube
+        let (alpha, size) = (roughness * roughness, SPECULAR_SIZE >> level);
+        kiln_bake::specular_level(&analysis, alpha, size, Cancel::NEVER).expect(WANTED).cube
     };
     let specular: Vec<Cube> = std::iter::once(mirror).chain((1..SPECULAR_LEVELS).map(level)).collect();
     add_cube(build, &format!("env/{name}/specular"), &specular);
-    add_cube(build, &format!("env/{name}/irradiance"), &[kiln_bake::irradiance(&analysis, 16).cube]);
-    add_cube(build, &format!("env/{name}/skybox"), &kiln_bake::skybox(&panorama, 256));
+    let irradiance = kiln_bake::irradiance(&analysis, 16, Cancel::NEVER).expect(WANTED);
+    add_cube(build, &format!("env/{name}/irradiance"), &[irradiance.cube]);
+    add_cube(build, &format!("env/{name}/skybox"), &skybox(256));
 }
 
 fn add_cube(build: &mut Build, name: &str, levels: &[Cube]) {
@@ -51,7 +55,8 @@ fn add_cube(build: &mut Build, name: &str, levels: &[Cube]) {
         levels.iter().flat_map(|level| &level.rgb).fold(0.0_f32, |largest, &value| largest.max(value));
     let scale = scale_log2(largest);
     let encode = |(index, level): (usize, &Cube)| {
-        (format!("mip{index}"), encode_level(level, TexelFormat::Rgba16Float, scale).bytes)
+        let level = encode_level(level, TexelFormat::Rgba16Float, scale, Cancel::NEVER).expect(WANTED);
+        (format!("mip{index}"), level.bytes)
     };
     let parts: Vec<(String, Vec<u8>)> = levels.iter().enumerate().map(encode).collect();
     let parts: Vec<(&str, Vec<u8>)> =
