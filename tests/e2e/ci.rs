@@ -72,6 +72,43 @@ fn junit_report_and_annotations_name_the_faulty_target_and_line() {
 }
 
 #[test]
+fn reports_go_to_bare_file_names_too() {
+    let project = Project::sample();
+    let run =
+        |arguments: &[&str]| project.command(arguments).current_dir(project.beside("")).output().unwrap();
+    for arguments in [["bake", "project", "--junit", "kiln.xml"], ["graph", "project", "--out", "graph.svg"]]
+    {
+        let output = run(&arguments);
+        assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
+        assert!(project.beside(arguments[3]).is_file());
+    }
+}
+
+#[test]
+fn check_of_a_broken_project_names_the_fault_and_nothing_else() {
+    let project = Project::sample();
+    project.bake();
+    std::fs::remove_dir_all(project.beside("cache")).unwrap();
+    project.edit("shaders/pbr/background.wgsl", "fn fs_main", "fn fs_main(");
+    for arguments in [vec!["bake", "DIR", "--check", "-j", "1"], vec!["bake", "DIR", "--check", "-k"]] {
+        let output = project.run(&arguments);
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1));
+        assert_eq!(said.matches("error:").count(), 1, "{said}");
+        assert!(said.contains("background.wgsl") && !text(&output.stdout).contains("commit"), "{said}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn output_that_cannot_be_written_is_a_failure() {
+    let project = Project::sample();
+    let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+    let output = project.command(&["plan", "DIR", "--json"]).stdout(full).output().unwrap();
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
+}
+
+#[test]
 fn failure_stops_the_bake_unless_it_is_to_keep_going() {
     let project = Project::sample();
     project.edit("shaders/pbr/background.wgsl", "fn fs_main", "fn fs_main(");

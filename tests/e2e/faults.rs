@@ -140,7 +140,7 @@ fn processes_killed_at_random_moments_leave_nothing_wrong_or_half() {
             }
         }
     }
-    println!(
+    eprintln!(
         "{kills} processes killed, {checks} bakes afterwards equal to undisturbed ones, 0 wrong or half files"
     );
 }
@@ -177,7 +177,7 @@ fn flipped_bit_in_any_cached_file_is_healed_by_the_next_bake() {
         assert_eq!(project.read("baked/manifest.json"), reference, "{}", file.display());
         outputs_are_whole(&project).unwrap();
     }
-    println!(
+    eprintln!(
         "{} bits flipped, {noticed} found by reading, every bake equal to the undisturbed one",
         fault_count()
     );
@@ -204,7 +204,7 @@ fn daemon_and_bakes_on_one_project_agree() {
     set_variant(&project, 0);
     let watch = project.watch();
     watch.published();
-    for variant in 1..6 {
+    for (variant, reference) in references.iter().enumerate().take(6).skip(1) {
         set_variant(&project, variant);
         let bakes = [spawn(&project, &["bake", "DIR"]), spawn(&project, &["bake", "DIR"])];
         for mut bake in bakes {
@@ -212,9 +212,7 @@ fn daemon_and_bakes_on_one_project_agree() {
         }
         // The daemon writes the same files; when it is done they are those of this variant.
         let deadline = Instant::now() + LIMIT;
-        while project.read("baked/manifest.json") != references[variant]
-            || outputs_are_whole(&project).is_err()
-        {
+        while project.read("baked/manifest.json") != *reference || outputs_are_whole(&project).is_err() {
             assert!(Instant::now() < deadline, "variant {variant} does not come");
             std::thread::yield_now();
         }

@@ -164,7 +164,40 @@ fn cache_deleted_under_a_running_daemon_is_made_anew_for_the_next_client() {
     let project = Project::sample();
     let watch = project.watch();
     let before = watch.client("first").revision();
-    std::fs::remove_dir_all(project.beside("cache/v2/cas")).unwrap();
+    // At once: the daemon may notice and begin to make it anew.
+    std::fs::rename(project.beside("cache/v2/cas"), project.beside("gone")).unwrap();
     let again = watch.client("second").revision();
     assert_eq!(again.table.targets, before.table.targets);
+}
+
+#[cfg(unix)]
+#[test]
+fn link_that_leads_elsewhere_is_followed_and_so_are_edits_behind_it() {
+    let project = Project::sample();
+    let tinted = |blue: &str| {
+        format!("@fragment fn fs_main() -> @location(0) vec4f {{ return vec4f(1.0, 1.0, {blue}, 1.0); }}\n")
+    };
+    for folder in ["v1", "v2"] {
+        std::fs::create_dir_all(project.path(folder)).unwrap();
+        project.write(&format!("{folder}/tonemap.wgsl"), tinted(if folder == "v1" { "0.5" } else { "0.6" }));
+    }
+    std::os::unix::fs::symlink("v1", project.path("cur")).unwrap();
+    // The second shader is the same file by another name.
+    project.write(
+        "kiln.toml",
+        "version = 1\n[shader.tonemap]\nsource = \"cur/../cur/tonemap.wgsl\"\n\
+         [shader.other]\nsource = \"./cur/tonemap.wgsl\"\nrole = \"tonemap\"\n",
+    );
+    let both = ["compile shader/other/base", "compile shader/tonemap/base"];
+    let watch = project.watch();
+    let first = watch.published();
+    let is_sound = |published: &serde_json::Value| published["diagnostics"].as_array().unwrap().is_empty();
+    assert!(is_sound(&first), "{first:#}");
+    project.write("v1/tonemap.wgsl", tinted("0.7"));
+    assert_eq!(ran(&watch.published()), both);
+    std::os::unix::fs::symlink("v2", project.path("next")).unwrap();
+    std::fs::rename(project.path("next"), project.path("cur")).unwrap();
+    assert_eq!(ran(&watch.published()), both);
+    project.write("v2/tonemap.wgsl", tinted("0.8"));
+    assert_eq!(ran(&watch.published()), both);
 }

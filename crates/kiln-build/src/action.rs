@@ -183,7 +183,7 @@ impl Inputs<'_> {
                 crate::sources::read_declared(self.engine.sources(), path, *digest).map(Some)
             }
             DeclaredInput::Blob { held: Some(bytes), .. } => Ok(Some(bytes.clone())),
-            DeclaredInput::Blob { digest, held: None } => match self.engine.store().get(digest)? {
+            DeclaredInput::Blob { digest, held: None } => match self.engine.store().get(digest) {
                 Some(bytes) => Ok(Some(bytes)),
                 None => Err(Error::Lost { what: format!("blob {}", digest.short()) }),
             },

@@ -13,6 +13,12 @@ use crate::{Digest, Error, Store, document};
 const TEMPORARY_AGE_MAX: Duration = Duration::from_secs(3600);
 /// What another machine's project published is held for this long after that project was last built.
 const FOREIGN_PROJECT_AGE_MAX: Duration = Duration::from_secs(30 * 24 * 3600);
+/// And that of a project whose folder is not there: a drive may come back.
+const ABSENT_PROJECT_AGE_MAX: Duration = Duration::from_secs(7 * 24 * 3600);
+/// A store that changed is looked over when that was not done for this long …
+const COLLECTION_INTERVAL: Duration = Duration::from_secs(24 * 3600);
+/// … or when this process alone wrote this share of what it may keep.
+const WRITTEN_SHARE: u64 = 16;
 /// Files of other formats that are younger may be in use by another version of this program, whose lock is not ours.
 const OTHER_FORMAT_AGE_MAX: Duration = Duration::from_secs(7 * 24 * 3600);
 /// Written by every collection; its time says when that was.
@@ -159,18 +165,21 @@ impl Store {
         // Equal times, as after a copy, in a fixed order.
         files.sort_by(|a, b| (a.used, &a.path).cmp(&(b.used, &b.path)));
         let mut kept_bytes: u64 = files.iter().map(|file| file.bytes).sum();
+        let counts = |file: &StoredFile| file.kind > FileKind::OtherFormat && !is_held(&held, file);
+        let mut counted_bytes: u64 = files.iter().filter(|file| counts(file)).map(|file| file.bytes).sum();
         for file in &files {
             let is_useless = match file.kind {
                 FileKind::OtherFormat => age(file.used).is_some_and(|age| age > OTHER_FORMAT_AGE_MAX),
                 FileKind::Temporary => age(file.used).is_none_or(|age| age > TEMPORARY_AGE_MAX),
                 FileKind::Blob | FileKind::Record | FileKind::Scan => {
-                    kept_bytes > options.bytes_max && !is_held(&held, file)
+                    counts(file) && counted_bytes > options.bytes_max
                 }
             };
             if is_useless && (options.dry_run || self.file_system().remove(&file.path).is_ok()) {
                 collected.removed_files += 1;
                 collected.removed_bytes += file.bytes;
                 kept_bytes -= file.bytes;
+                counted_bytes -= if counts(file) { file.bytes } else { 0 };
             } else if is_held(&held, file) {
                 collected.held_bytes += file.bytes;
             }
@@ -182,6 +191,23 @@ impl Store {
             let _ = self.file_system().touch(&mark).or_else(|_| self.file_system().write_new(&mark, b""));
         }
         Ok(Some(collected))
+    }
+
+    /// [`Store::collect`] if this process wrote something and it is time for it again, unless a build is running.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn collect_if_due(&self, bytes_max: u64) -> Result<Option<Collected>, Error> {
+        let is_due = self.since_collection().is_none_or(|since| since > COLLECTION_INTERVAL)
+            || self.written_bytes() > bytes_max / WRITTEN_SHARE;
+        if self.written_bytes() == 0 || self.is_read_only() || !is_due {
+            return Ok(None);
+        }
+        let collected = self.collect(&CollectOptions { bytes_max, wait: false, dry_run: false })?;
+        if collected.is_some() {
+            self.forget_written();
+        }
+        Ok(collected)
     }
 
     /// Since when nothing was collected; `None` if never.
@@ -221,6 +247,12 @@ impl Store {
         {
             self.add_files(&self.root().join(folder), kind, &mut files)?;
         }
+        // Killed processes may have left something beside these, too.
+        for path in
+            self.list(self.root())?.into_iter().chain(self.project_files()?).filter(|path| is_temporary(path))
+        {
+            self.add_file(path, FileKind::Temporary, &mut files)?;
+        }
         let cache = self.root().parent().unwrap_or(self.root());
         for path in self.list(cache)? {
             if path != self.root() && is_format_folder(&path) {
@@ -231,18 +263,27 @@ impl Store {
     }
 
     fn add_files(&self, folder: &Path, kind: FileKind, files: &mut Vec<StoredFile>) -> Result<(), Error> {
-        for path in self.list(folder)? {
-            match self.file_system().facts(&path) {
-                Ok(facts) => {
-                    let kind = if is_temporary(&path) { FileKind::Temporary } else { kind };
-                    files.push(StoredFile { path, bytes: facts.bytes, used: facts.modified, kind });
-                }
-                Err(_) if path.is_dir() => self.add_files(&path, kind, files)?,
-                // It went while the folder was being listed.
-                Err(_) => {}
+        self.list(folder)?.into_iter().try_for_each(|path| self.add_file(path, kind, files))
+    }
+
+    fn add_file(&self, path: PathBuf, kind: FileKind, files: &mut Vec<StoredFile>) -> Result<(), Error> {
+        match self.file_system().facts(&path) {
+            Ok(facts) => {
+                let kind = if is_temporary(&path) { FileKind::Temporary } else { kind };
+                files.push(StoredFile { path, bytes: facts.bytes, used: facts.modified, kind });
+                Ok(())
             }
+            Err(_) if path.is_dir() => self.add_files(&path, kind, files),
+            // It went while the folder was being listed.
+            Err(_) => Ok(()),
         }
-        Ok(())
+    }
+
+    fn project_files(&self) -> Result<Vec<PathBuf>, Error> {
+        let folders = self.list(&self.root().join(PROJECTS))?;
+        let files: Vec<Vec<PathBuf>> =
+            folders.iter().map(|folder| self.list(folder)).collect::<Result<_, _>>()?;
+        Ok(files.into_iter().flatten().collect())
     }
 
     fn list(&self, folder: &Path) -> Result<Vec<PathBuf>, Error> {
@@ -263,15 +304,14 @@ impl Store {
             let Ok(bytes) = self.file_system().read(&path) else { continue };
             let Some(published) = document::decode::<Published>(&path, &bytes) else { continue };
             let used = self.file_system().facts(&path).ok().and_then(|facts| age(facts.modified));
-            let is_foreign = published.host != host();
-            let is_held = match is_foreign {
-                true => used.is_none_or(|age| age <= FOREIGN_PROJECT_AGE_MAX),
-                false => Path::new(&published.folder).is_dir(),
-            };
+            let age_max =
+                if published.host == host() { ABSENT_PROJECT_AGE_MAX } else { FOREIGN_PROJECT_AGE_MAX };
+            let is_here = published.host == host() && published.folder.is_dir();
+            let is_held = is_here || used.is_none_or(|age| age <= age_max);
             let parts = published.targets.values().flat_map(|target| &target.parts);
             let digests = parts.map(|part| part.digest).collect();
             let usage = ProjectUsage {
-                folder: published.folder,
+                folder: published.folder.to_string_lossy().into_owned(),
                 host: published.host,
                 is_held,
                 targets: published.targets.len(),
@@ -286,6 +326,7 @@ impl Store {
             // What cannot be removed is tried again by the next collection.
             let _ = self.file_system().remove(&path);
         }
+        let _ = std::fs::remove_dir(&project.folder);
     }
 }
 

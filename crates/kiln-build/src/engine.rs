@@ -13,7 +13,8 @@ use crate::digest::FieldHasher;
 use crate::memory::{Memory, ScanMemory};
 use crate::sources::lock;
 use crate::{
-    ActionRecord, BuildNote, ChangeNote, Digest, Error, Graph, SourceState, SourceTree, Store, Targets,
+    ActionRecord, BuildNote, ChangeNote, Digest, Error, FilesOfTarget, Graph, SourceState, SourceTree, Store,
+    Target, Targets,
 };
 
 /// How many results of a scan are kept for one content of its root: its other files may have been edited and put back.
@@ -21,6 +22,7 @@ const SCAN_RESULTS_KEPT: usize = 8;
 const MEMORY_FILE: &str = "memory.json";
 pub(crate) const PUBLISHED_FILE: &str = "published.json";
 const OUTPUT_LOCK_FILE: &str = "output.lock";
+const MEMORY_LOCK_FILE: &str = "memory.lock";
 
 /// The engine of one project.
 #[derive(Debug)]
@@ -51,7 +53,9 @@ pub struct Scan {
 #[derive(Serialize, Deserialize)]
 pub(crate) struct Published<'a> {
     pub(crate) host: String,
-    pub(crate) folder: String,
+    /// Its folder, exactly: the bytes of the path, as few of them are no UTF-8.
+    #[serde(with = "exact_path")]
+    pub(crate) folder: PathBuf,
     pub(crate) targets: Cow<'a, Targets>,
 }
 
@@ -77,11 +81,12 @@ impl Engine {
     /// Opens the project in `folder` with a store.
     ///
     /// # Errors
-    /// The folder cannot be found or the store cannot be read.
+    /// The folder cannot be found.
     pub fn open(folder: &Path, store: Store) -> Result<Engine, Error> {
         let folder = folder.canonicalize().map_err(Error::io("find the folder", folder))?;
         let project = Digest::of(folder.as_os_str().as_encoded_bytes());
-        let mut memory: Memory = store.project_document(&project, MEMORY_FILE)?.unwrap_or_default();
+        let mut memory: Memory = store.project_document(&project, MEMORY_FILE).unwrap_or_default();
+        memory.read_build = memory.next_build() - 1;
         let sources = SourceTree::new(folder.clone(), std::mem::take(&mut memory.source_stamps));
         let outputs = SourceTree::new(folder.clone(), std::mem::take(&mut memory.output_stamps));
         let memory = Mutex::new(memory);
@@ -113,21 +118,21 @@ impl Engine {
         self.sources.state(path)
     }
 
-    /// What was published last, as far as its contents are still there: the last good content of every target.
-    ///
-    /// # Errors
-    /// It is there and cannot be read.
-    pub fn published(&self) -> Result<Arc<Targets>, Error> {
+    /// What was published last: the last good content of every target. Some of it may be lost.
+    pub fn published(&self) -> Arc<Targets> {
         let mut published = lock(&self.published);
         if let Some(targets) = &*published {
-            return Ok(targets.clone());
+            return targets.clone();
         }
-        let found: Option<Published> = self.store.project_document(&self.project, PUBLISHED_FILE)?;
-        let mut targets = found.map(|found| found.targets.into_owned()).unwrap_or_default();
-        targets.retain(|_, target| {
-            target.parts.iter().all(|part| self.store.contains(&part.digest, part.bytes))
-        });
-        Ok(published.insert(Arc::new(targets)).clone())
+        let found: Option<Published> = self.store.project_document(&self.project, PUBLISHED_FILE);
+        published.insert(Arc::new(found.map(|found| found.targets.into_owned()).unwrap_or_default())).clone()
+    }
+
+    /// A target of what was published last, if all its contents are there.
+    pub fn last_good(&self, target: &str) -> Option<Target> {
+        let published = self.published();
+        let target = published.get(target)?;
+        target.parts.iter().all(|part| self.store.contains(&part.digest, part.bytes)).then(|| target.clone())
     }
 
     /// Makes `targets` what is published. From here on no crash and no collection takes their contents.
@@ -137,7 +142,7 @@ impl Engine {
     pub fn publish(&self, targets: &Arc<Targets>) -> Result<(), Error> {
         let published = Published {
             host: crate::collect::host(),
-            folder: self.folder.to_string_lossy().into_owned(),
+            folder: self.folder.clone(),
             targets: Cow::Borrowed(&**targets),
         };
         self.store.put_project_document(&self.project, PUBLISHED_FILE, &published)?;
@@ -145,7 +150,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Keeps the engine's own memory for the next process.
+    /// Keeps the engine's own memory for the next process, together with what others have noted meanwhile.
     ///
     /// # Errors
     /// It cannot be written.
@@ -155,11 +160,32 @@ impl Engine {
         if !memory.is_changed && memory.source_stamps == sources && memory.output_stamps == outputs {
             return Ok(());
         }
+        let _lock = self.store.lock_project(&self.project, MEMORY_LOCK_FILE);
+        if let Some(theirs) = self.store.project_document(&self.project, MEMORY_FILE) {
+            memory.merge(theirs);
+        }
         memory.scans.retain(|_, scan| scan.is_asked);
         (memory.source_stamps, memory.output_stamps) = (sources, outputs);
         self.store.put_project_document(&self.project, MEMORY_FILE, &*memory)?;
         memory.is_changed = false;
+        memory.read_build = memory.next_build() - 1;
+        memory.own.clear();
         Ok(())
+    }
+
+    /// Which files were made of a target, if that was noted for this content and this maker.
+    pub fn files_of(&self, name: &str, target: Digest, maker: u32) -> Option<FilesOfTarget> {
+        let memory = lock(&self.memory);
+        memory.files.get(name).filter(|known| known.target == target && known.maker == maker).cloned()
+    }
+
+    /// Notes which files were made of a target.
+    pub fn note_files(&self, name: &str, files: FilesOfTarget) {
+        let mut memory = lock(&self.memory);
+        if memory.files.get(name) != Some(&files) {
+            memory.files.insert(name.to_owned(), files);
+            memory.is_changed = true;
+        }
     }
 
     /// Held while the files for engines are written, so that two processes do not mix theirs.
@@ -206,7 +232,7 @@ impl Engine {
     /// every file it looked at, the missing ones too, is as it was.
     ///
     /// # Errors
-    /// The store cannot be read or written.
+    /// The store cannot be written.
     pub fn scan(
         &self,
         kind: &str,
@@ -246,7 +272,7 @@ impl Engine {
         let content = self.source(root).digest().map(|digest| digest.to_string());
         hasher.field("content", content.unwrap_or_default().as_bytes());
         let key = hasher.finish();
-        let mut known: Vec<Scan> = self.store.scans(&key)?;
+        let mut known: Vec<Scan> = self.store.scans(&key);
         if let Some(scan) = known.iter().find(|scan| self.still_holds(scan)) {
             return Ok(scan.clone());
         }
@@ -261,5 +287,46 @@ impl Engine {
 
     fn still_holds(&self, scan: &Scan) -> bool {
         scan.looked_at.iter().all(|(path, digest)| self.sources.is(path, *digest))
+    }
+}
+
+/// A path as a text, in which whatever is no UTF-8 is escaped as `%XX`, and `%` itself.
+mod exact_path {
+    use std::path::{Path, PathBuf};
+
+    use serde::{Deserialize as _, Deserializer, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut text = String::new();
+        for chunk in path.as_os_str().as_encoded_bytes().utf8_chunks() {
+            text += &chunk.valid().replace('%', "%25");
+            chunk.invalid().iter().for_each(|byte| text += &format!("%{byte:02X}"));
+        }
+        serializer.serialize_str(&text)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<PathBuf, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        let mut bytes = Vec::new();
+        let mut rest = text.as_bytes();
+        while let [first, tail @ ..] = rest {
+            let escaped = (*first == b'%').then(|| tail.split_at_checked(2)).flatten();
+            let byte = escaped
+                .and_then(|(digits, _)| u8::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok());
+            bytes.push(byte.unwrap_or(*first));
+            rest = if byte.is_some() { &tail[2..] } else { tail };
+        }
+        Ok(path_of(bytes))
+    }
+
+    #[cfg(unix)]
+    fn path_of(bytes: Vec<u8>) -> PathBuf {
+        use std::os::unix::ffi::OsStringExt as _;
+        std::ffi::OsString::from_vec(bytes).into()
+    }
+
+    #[cfg(not(unix))]
+    fn path_of(bytes: Vec<u8>) -> PathBuf {
+        String::from_utf8_lossy(&bytes).into_owned().into()
     }
 }

@@ -92,8 +92,8 @@ impl fmt::Display for Reason {
 
 fn deciding_fields(record: &ActionRecord) -> BTreeMap<String, String> {
     let mut fields = BTreeMap::new();
-    record.list_deciding_fields(&mut |name, value| {
-        fields.insert(name.to_owned(), value.to_owned());
+    record.list_deciding_fields(&mut |field| {
+        fields.insert(field.shown, field.value);
     });
     fields
 }

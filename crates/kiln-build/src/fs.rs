@@ -116,7 +116,7 @@ pub fn write_atomically(fs: &dyn FileSystem, path: &Path, bytes: &[u8]) -> Resul
 pub(crate) fn write_all_atomically(fs: &dyn FileSystem, files: &[(PathBuf, &[u8])]) -> Result<(), Error> {
     let mut folders: Vec<&Path> = Vec::new();
     for (path, bytes) in files {
-        let folder = path.parent().unwrap_or(Path::new("."));
+        let folder = folder_of(path);
         let temporary = folder.join(temporary_name());
         let result = write_synced(fs, folder, &temporary, bytes)
             .and_then(|()| fs.rename(&temporary, path).map_err(Error::io("rename to", path)));
@@ -137,11 +137,21 @@ pub(crate) fn write_all_atomically(fs: &dyn FileSystem, files: &[(PathBuf, &[u8]
 fn write_synced(fs: &dyn FileSystem, folder: &Path, temporary: &Path, bytes: &[u8]) -> Result<(), Error> {
     // Folders are there nearly always: asking first would cost more than trying.
     let written = fs.write_new(temporary, bytes).or_else(|error| match error.kind() {
-        io::ErrorKind::NotFound => fs.create_folder(folder).and_then(|()| fs.write_new(temporary, bytes)),
+        io::ErrorKind::NotFound => {
+            fs.create_folder(folder)?;
+            // The new folder's own name must last, too.
+            fs.sync_folder(folder_of(folder))?;
+            fs.write_new(temporary, bytes)
+        }
         _ => Err(error),
     });
     written.map_err(Error::io("write", temporary))?;
     fs.sync(temporary).map_err(Error::io("sync", temporary))
+}
+
+/// The folder of a file; of a bare name the present one.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Unique among the processes and machines that share a folder.

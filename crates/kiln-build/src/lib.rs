@@ -17,7 +17,7 @@ pub use digest::Digest;
 pub use engine::{Engine, Scan, Tracker};
 pub use explain::{Change, Reason};
 pub use fs::{Disk, FileFacts, FileSystem, write_atomically};
-pub use memory::{BuildNote, ChangeNote};
+pub use memory::{BuildNote, ChangeNote, FilesOfTarget};
 pub use record::{ActionRecord, ActionResult, Command, InputRecord, OutputRecord};
 pub use run::{Outcome, Progress, RunOptions, RunReport, Status};
 pub use sources::{SOURCE_BYTES_MAX, SourceState, SourceTree};

@@ -1,6 +1,6 @@
 //! What is remembered of a project between runs. Losing it costs time, never correctness.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
@@ -24,9 +24,28 @@ pub(crate) struct Memory {
     pub(crate) source_stamps: BTreeMap<String, Stamp>,
     /// The same for the files that were written for engines.
     pub(crate) output_stamps: BTreeMap<String, Stamp>,
+    /// By target: which files were made of which content.
+    pub(crate) files: BTreeMap<String, FilesOfTarget>,
     /// Whether it differs from what is on the disk.
     #[serde(skip)]
     pub(crate) is_changed: bool,
+    /// Number of the last build when this was read.
+    #[serde(skip)]
+    pub(crate) read_build: u64,
+    /// Actions that this process has settled otherwise.
+    #[serde(skip)]
+    pub(crate) own: BTreeSet<String>,
+}
+
+/// Files that were made of a target's content, so that they need not be made again to be compared.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FilesOfTarget {
+    /// Digest of the target.
+    pub target: Digest,
+    /// Version of the code that made them.
+    pub maker: u32,
+    /// Path, digest and length of each.
+    pub files: Vec<(String, Digest, u64)>,
 }
 
 /// A build that changed something.
@@ -93,6 +112,7 @@ impl Memory {
         let since = before.map(|before| before.change.build);
         let change = ChangeNote { build, since, reason, ran };
         self.actions.insert(record.name.clone(), ActionMemory { key, record: record.clone(), change });
+        self.own.insert(record.name.clone());
         self.is_changed = true;
     }
 
@@ -102,5 +122,32 @@ impl Memory {
         let surplus = self.builds.len().saturating_sub(BUILDS_KEPT);
         self.builds.drain(..surplus);
         self.is_changed = true;
+    }
+
+    /// Takes over what other processes have written since this was read: their builds come before this process's own, whose
+    /// numbers move up, and where this process has settled nothing theirs holds.
+    pub(crate) fn merge(&mut self, theirs: Memory) {
+        let their_last = theirs.builds.last().map_or(0, |build| build.number);
+        if their_last == self.read_build {
+            return;
+        }
+        let shift = their_last.saturating_sub(self.read_build);
+        let read_build = self.read_build;
+        let renumber = |number: u64| if number > read_build { number + shift } else { number };
+        let own_builds: Vec<BuildNote> =
+            self.builds.drain(..).filter(|build| build.number > read_build).collect();
+        self.builds = theirs.builds;
+        self.builds.extend(
+            own_builds.into_iter().map(|build| BuildNote { number: renumber(build.number), ..build }),
+        );
+        for (name, mut memory) in theirs.actions {
+            if let Some(own) = self.actions.get(&name).filter(|_| self.own.contains(&name)) {
+                memory = own.clone();
+                memory.change.build = renumber(memory.change.build);
+                memory.change.since = memory.change.since.map(renumber);
+            }
+            self.actions.insert(name, memory);
+        }
+        self.read_build = their_last;
     }
 }

@@ -43,6 +43,9 @@ pub struct InputRecord {
     pub digest: Option<Digest>,
     /// Its length; follows from the digest.
     pub bytes: u64,
+    /// The output's name, if an action made it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made_as: Option<String>,
 }
 
 /// One thing an action made.
@@ -83,31 +86,46 @@ pub struct ActionRecord {
 }
 
 impl ActionRecord {
-    /// The digest of everything that can change the result: kind, recipe, parameters, declared outputs, inputs.
+    /// The digest of everything that can change the result: kind, recipe, parameters, declared outputs, inputs. Contents
+    /// made by actions count by their place and the output's name, so that equal work has one key whatever the actions
+    /// before it are called; sources by their path, which may stand in what is made of them.
     pub fn key(&self) -> Digest {
         let mut hasher = FieldHasher::default();
-        self.list_deciding_fields(&mut |name, value| hasher.field(name, value.as_bytes()));
+        self.list_deciding_fields(&mut |field| hasher.field(&field.key, field.value.as_bytes()));
         hasher.finish()
     }
 
     /// The one list behind [`ActionRecord::key`] and [`crate::Reason`].
-    pub(crate) fn list_deciding_fields(&self, sink: &mut dyn FnMut(&str, &str)) {
+    pub(crate) fn list_deciding_fields(&self, sink: &mut dyn FnMut(DecidingField)) {
         let Command { kind, recipe, params, outputs } = &self.command;
-        sink("key version", &KEY_VERSION.to_string());
-        sink("kind", kind);
-        sink("recipe version", &recipe.to_string());
+        let mut field = |name: &str, value: String| {
+            sink(DecidingField { key: name.to_owned(), shown: name.to_owned(), value });
+        };
+        field("key version", KEY_VERSION.to_string());
+        field("kind", kind.clone());
+        field("recipe version", recipe.to_string());
         match params {
             serde_json::Value::Object(params) => {
-                for (name, value) in params {
-                    sink(&format!("parameter {name}"), &value.to_string());
-                }
+                params
+                    .iter()
+                    .for_each(|(name, value)| field(&format!("parameter {name}"), value.to_string()));
             }
-            other => sink("parameters", &other.to_string()),
+            other => field("parameters", other.to_string()),
         }
-        sink("declared outputs", &outputs.join(", "));
-        for input in &self.inputs {
+        field("declared outputs", outputs.join(", "));
+        for (index, input) in self.inputs.iter().enumerate() {
             let digest = input.digest.map_or_else(|| "missing".to_owned(), |digest| digest.to_string());
-            sink(&format!("input {}", input.name), &digest);
+            let key = format!("input {index} {}", input.made_as.as_ref().unwrap_or(&input.name));
+            sink(DecidingField { key, shown: format!("input {}", input.name), value: digest });
         }
     }
+}
+
+/// One thing that decides an action's result.
+pub(crate) struct DecidingField {
+    /// Its name in the key.
+    pub(crate) key: String,
+    /// Its name for people.
+    pub(crate) shown: String,
+    pub(crate) value: String,
 }

@@ -1,6 +1,6 @@
 //! Bringing a graph up to date.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
@@ -138,7 +138,7 @@ impl Engine {
     /// # Errors
     /// The first failure of the tool; failures of inputs are in the report.
     pub fn run(&self, graph: &Graph, options: &RunOptions) -> Result<RunReport, Error> {
-        let shared = Shared::new(graph, self.survey(graph)?);
+        let shared = Shared::new(graph, self.survey(graph));
         let waiting = lock(&shared.progress).unsettled;
         if waiting > 0 {
             std::thread::scope(|scope| {
@@ -207,18 +207,15 @@ impl Engine {
     ) -> Result<Settled, Error> {
         let action = graph.action(id);
         let unperformed = match shared.declare(self, graph, id) {
-            Turn::Known(record) => record,
+            Turn::Unperformed(record) => record,
             Turn::Settled(outcome) => return Ok(Settled { outcome, blobs: Vec::new() }),
-            Turn::Declared(record) => {
-                match self.look_up(&record)?.filter(|known| self.store().has_outputs(known)) {
-                    Some(record) => {
-                        let outcome = Outcome { status: Status::Reused, record: Some(record) };
-                        return Ok(Settled { outcome, blobs: Vec::new() });
-                    }
-                    None => record,
-                }
-            }
         };
+        // Two actions of a graph may be the same work: the second finds the first one's result.
+        let _claim = shared.claim(unperformed.key());
+        if let Some(record) = self.look_up(&unperformed).filter(|known| self.store().has_outputs(known)) {
+            let outcome = Outcome { status: Status::Reused, record: Some(record) };
+            return Ok(Settled { outcome, blobs: Vec::new() });
+        }
         let lengths: Vec<u64> = unperformed.inputs.iter().map(|input| input.bytes).collect();
         let need_bytes = (action.memory)(&lengths);
         if !shared.enter((action.rank, id.0), need_bytes, options) {
@@ -231,11 +228,7 @@ impl Engine {
         let start = Instant::now();
         let made = (action.perform)(&Inputs { engine: self, declared, cancel: options.cancel })?;
         let wall_ms = start.elapsed().as_secs_f64() * 1e3;
-        let (record, blobs) = self.keep(unperformed, made, wall_ms)?;
-        Ok(Settled {
-            outcome: Outcome { status: Status::Ran { reason }, record: Some(Arc::new(record)) },
-            blobs,
-        })
+        self.keep(unperformed, made, wall_ms, reason)
     }
 
     fn keep(
@@ -243,7 +236,8 @@ impl Engine {
         mut record: ActionRecord,
         made: ActionOutput,
         wall_ms: f64,
-    ) -> Result<(ActionRecord, Vec<Arc<[u8]>>), Error> {
+        reason: Reason,
+    ) -> Result<Settled, Error> {
         check_declared(&record, &made)?;
         let mut outputs = Vec::with_capacity(made.outputs.len());
         let mut blobs: Vec<Arc<[u8]>> = Vec::with_capacity(made.outputs.len());
@@ -253,7 +247,10 @@ impl Engine {
         }
         record.result = ActionResult { outputs, meta: made.meta, diagnostics: made.diagnostics, wall_ms };
         self.store().put_result(&record, &blobs)?;
-        Ok((record, blobs))
+        Ok(Settled {
+            outcome: Outcome { status: Status::Ran { reason }, record: Some(Arc::new(record)) },
+            blobs,
+        })
     }
 }
 
@@ -315,17 +312,29 @@ struct RunProgress {
     working_bytes: u64,
     /// (rank, index) of the actions that wait for room; the first of them is the next to get it.
     waiting_for_room: BTreeSet<(u32, usize)>,
+    /// Keys of the work that is being done.
+    claimed: HashSet<Digest>,
     is_stopped: bool,
     error: Option<Error>,
 }
 
 /// What is known of an action whose turn it is.
 enum Turn {
-    /// The survey has found no result for it.
-    Known(ActionRecord),
-    /// Its inputs have become known.
-    Declared(ActionRecord),
+    Unperformed(ActionRecord),
     Settled(Outcome),
+}
+
+/// The right to do some work, which nobody else in this run does at the same time.
+struct Claim<'a> {
+    shared: &'a Shared,
+    key: Digest,
+}
+
+impl Drop for Claim<'_> {
+    fn drop(&mut self) {
+        lock(&self.shared.progress).claimed.remove(&self.key);
+        self.shared.changed.notify_all();
+    }
 }
 
 /// Memory set aside for an action at work.
@@ -401,11 +410,11 @@ impl Shared {
     fn declare(&self, engine: &Engine, graph: &Graph, id: ActionId) -> Turn {
         let mut progress = lock(&self.progress);
         if let Some(record) = progress.due.remove(&id.0) {
-            return Turn::Known(record);
+            return Turn::Unperformed(record);
         }
         let action = graph.action(id);
         match engine.declare(graph, action, |upstream| progress.outcomes[upstream.0].as_ref()) {
-            Declared::Ready(inputs) => Turn::Declared(unperformed(action, inputs)),
+            Declared::Ready(inputs) => Turn::Unperformed(unperformed(action, inputs)),
             Declared::Waiting(_) => Turn::Settled(NOT_RUN),
             Declared::Blocked(by) => {
                 let is_not_run = |upstream: usize| {
@@ -418,6 +427,15 @@ impl Shared {
                 Turn::Settled(Outcome { status, record: None })
             }
         }
+    }
+
+    /// Waits until nobody does the work of this key.
+    fn claim(&self, key: Digest) -> Claim<'_> {
+        let mut progress = lock(&self.progress);
+        while !progress.claimed.insert(key) {
+            progress = self.wait(progress);
+        }
+        Claim { shared: self, key }
     }
 
     /// Waits for room; false if the run ends instead.

@@ -169,6 +169,8 @@ impl SourceTree {
     fn examine(&self, path: &str) -> Seen {
         let full = self.root.join(path);
         let without_content = |state| Seen { state, bytes: 0 };
+        // Before the file is looked at: hashing a large one takes longer than a change needs.
+        let now = SystemTime::now();
         let metadata = match fs::metadata(&full) {
             Ok(metadata) => metadata,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
@@ -193,7 +195,7 @@ impl SourceTree {
         self.count_hashed(bytes);
         match fs::File::open(&full).and_then(|file| Digest::of_reader(&mut file.take(SOURCE_BYTES_MAX))) {
             Ok(digest) => {
-                let stamp = Stamp::new(&metadata, digest, is_settled(&metadata, SystemTime::now()));
+                let stamp = Stamp::new(&metadata, digest, is_settled(&metadata, now));
                 lock(&self.stamps).insert(path.to_owned(), stamp);
                 Seen { state: SourceState::Present(digest), bytes }
             }

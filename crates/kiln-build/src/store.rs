@@ -13,17 +13,19 @@
 //! fails the check is dropped and counts as absent. A cache that cannot be written is read, and what it lacks goes to a
 //! temporary folder.
 
+use std::collections::HashSet;
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, SystemTime};
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::fs::{FileFacts, temporary_name, write_all_atomically};
+use crate::sources::lock;
 use crate::{ActionRecord, Digest, Disk, FileSystem, document};
 
 /// Folder of the present format below a cache's root. Others are of other versions and nobody's business but the
@@ -42,14 +44,14 @@ const USE_MARK_AGE: Duration = Duration::from_secs(3600);
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A file operation failed.
-    #[error("cannot {operation} {}: {source}", path.display())]
+    #[error("cannot {operation} {}: {reason}", path.display())]
     Io {
         /// As `write`.
         operation: &'static str,
         /// The file.
         path: PathBuf,
-        /// The system's reason.
-        source: io::Error,
+        /// The system's.
+        reason: io::Error,
     },
     /// An action failed for a reason that is not its input.
     #[error("action `{action}` failed: {reason}")]
@@ -77,9 +79,15 @@ pub enum Error {
 }
 
 impl Error {
+    /// Whether there was no room on the disk.
+    pub fn is_disk_full(&self) -> bool {
+        use io::ErrorKind::{QuotaExceeded, StorageFull};
+        matches!(self, Error::Io { reason, .. } if matches!(reason.kind(), StorageFull | QuotaExceeded))
+    }
+
     pub(crate) fn io(operation: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Error {
         let path = path.to_owned();
-        move |source| Error::Io { operation, path, source }
+        move |reason| Error::Io { operation, path, reason }
     }
 }
 
@@ -90,6 +98,8 @@ pub struct Store {
     root: PathBuf,
     /// Where new files go if the root cannot be written.
     scratch: Option<tempfile::TempDir>,
+    /// Files that are of no use and could not be removed.
+    useless: Mutex<HashSet<PathBuf>>,
     damaged: AtomicUsize,
     written_bytes: AtomicU64,
 }
@@ -125,7 +135,14 @@ impl Store {
             }
             Err(error) => return Err(Error::io("create the folder", &root)(error)),
         };
-        Ok(Store { fs, root, scratch, damaged: AtomicUsize::new(0), written_bytes: AtomicU64::new(0) })
+        Ok(Store {
+            fs,
+            root,
+            scratch,
+            useless: Mutex::default(),
+            damaged: AtomicUsize::new(0),
+            written_bytes: AtomicU64::new(0),
+        })
     }
 
     /// The folder of this format's files.
@@ -199,28 +216,28 @@ impl Store {
         }
         let bytes: usize = files.iter().map(|(_, bytes)| bytes.len()).sum();
         self.written_bytes.fetch_add(bytes as u64, Ordering::Relaxed);
-        write_all_atomically(&*self.fs, &files)
+        write_all_atomically(&*self.fs, &files)?;
+        let mut useless = lock(&self.useless);
+        files.iter().for_each(|(path, _)| _ = useless.remove(path));
+        Ok(())
     }
 
     /// The bytes named `digest`, or `None` if they are absent; damaged ones are removed and count as absent.
-    ///
-    /// # Errors
-    /// They are there and cannot be read.
-    pub fn get(&self, digest: &Digest) -> Result<Option<Arc<[u8]>>, Error> {
+    pub fn get(&self, digest: &Digest) -> Option<Arc<[u8]>> {
         for path in self.paths(BLOBS, digest, "") {
-            let Some(bytes) = self.read_if_present(&path)? else { continue };
+            let Some(bytes) = self.read_if_present(&path) else { continue };
             if Digest::of(&bytes) == *digest {
-                return Ok(Some(bytes.into()));
+                return Some(bytes.into());
             }
             self.drop_damaged(&path);
         }
-        Ok(None)
+        None
     }
 
     /// Whether a blob of this name and length is there (its content is checked when it is read).
     pub fn contains(&self, digest: &Digest, bytes: u64) -> bool {
         self.paths(BLOBS, digest, "").iter().any(|path| match self.fs.facts(path) {
-            Ok(facts) if facts.bytes == bytes => {
+            Ok(facts) if facts.bytes == bytes && !lock(&self.useless).contains(path) => {
                 self.mark_used(path, facts);
                 true
             }
@@ -234,12 +251,9 @@ impl Store {
     }
 
     /// The record of the action with this key. What it made may be gone.
-    ///
-    /// # Errors
-    /// It is there and cannot be read.
-    pub fn record(&self, key: &Digest) -> Result<Option<ActionRecord>, Error> {
-        let record: Option<ActionRecord> = self.read_document(&self.paths(RECORDS, key, ".json"))?;
-        Ok(record.filter(|record| record.key() == *key))
+    pub fn record(&self, key: &Digest) -> Option<ActionRecord> {
+        let record: Option<ActionRecord> = self.read_document(&self.paths(RECORDS, key, ".json"));
+        record.filter(|record| record.key() == *key)
     }
 
     /// How many damaged files were dropped since the store was opened.
@@ -252,9 +266,13 @@ impl Store {
         self.written_bytes.load(Ordering::Relaxed)
     }
 
+    pub(crate) fn forget_written(&self) {
+        self.written_bytes.store(0, Ordering::Relaxed);
+    }
+
     /// Reads a list of earlier scans.
-    pub(crate) fn scans<T: DeserializeOwned + Default>(&self, key: &Digest) -> Result<T, Error> {
-        Ok(self.read_document(&self.paths(SCANS, key, ".json"))?.unwrap_or_default())
+    pub(crate) fn scans<T: DeserializeOwned + Default>(&self, key: &Digest) -> T {
+        self.read_document(&self.paths(SCANS, key, ".json")).unwrap_or_default()
     }
 
     pub(crate) fn put_scans<T: Serialize>(&self, key: &Digest, scans: &T) -> Result<(), Error> {
@@ -262,11 +280,7 @@ impl Store {
     }
 
     /// Reads a document of a project; one that is damaged counts as absent.
-    pub(crate) fn project_document<T: DeserializeOwned>(
-        &self,
-        project: &Digest,
-        name: &str,
-    ) -> Result<Option<T>, Error> {
+    pub(crate) fn project_document<T: DeserializeOwned>(&self, project: &Digest, name: &str) -> Option<T> {
         let below = Path::new(PROJECTS).join(project.to_string()).join(name);
         let paths: Vec<PathBuf> = self.roots().map(|root| root.join(&below)).collect();
         self.read_document(&paths)
@@ -302,15 +316,20 @@ impl Store {
         Some(file)
     }
 
-    fn read_document<T: DeserializeOwned>(&self, paths: &[PathBuf]) -> Result<Option<T>, Error> {
+    fn read_document<T: DeserializeOwned>(&self, paths: &[PathBuf]) -> Option<T> {
         for path in paths {
-            let Some(bytes) = self.read_if_present(path)? else { continue };
+            let Some(bytes) = self.read_if_present(path) else { continue };
             match document::decode(path, &bytes) {
-                Some(document) => return Ok(Some(document)),
+                Some(document) => {
+                    if let Ok(facts) = self.fs.facts(path) {
+                        self.mark_used(path, facts);
+                    }
+                    return Some(document);
+                }
                 None => self.drop_damaged(path),
             }
         }
-        Ok(None)
+        None
     }
 
     fn write_document<T: Serialize>(&self, path: &Path, value: &T) -> Result<(), Error> {
@@ -343,17 +362,28 @@ impl Store {
         }
     }
 
+    /// Removes what fails its check; what cannot be removed is not looked at again.
     pub(crate) fn drop_damaged(&self, path: &Path) {
         self.damaged.fetch_add(1, Ordering::Relaxed);
-        // A read-only cache cannot drop it; the file stays and stays ignored.
-        let _ = self.fs.remove(path);
+        if self.fs.remove(path).is_err() {
+            lock(&self.useless).insert(path.to_owned());
+        }
     }
 
-    fn read_if_present(&self, path: &Path) -> Result<Option<Vec<u8>>, Error> {
+    /// A file that is there and cannot be read is no better than an absent one, and stays: the fault may pass.
+    fn read_if_present(&self, path: &Path) -> Option<Vec<u8>> {
+        if lock(&self.useless).contains(path) {
+            return None;
+        }
         match self.fs.read(path) {
-            Ok(bytes) => Ok(Some(bytes)),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-            Err(error) => Err(Error::io("read", path)(error)),
+            Ok(bytes) => Some(bytes),
+            Err(error) => {
+                if error.kind() != io::ErrorKind::NotFound {
+                    self.damaged.fetch_add(1, Ordering::Relaxed);
+                    lock(&self.useless).insert(path.to_owned());
+                }
+                None
+            }
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::run::{Outcome, Status};
-use crate::{Action, ActionId, ActionRecord, ActionResult, Engine, Error, Graph, Input, InputRecord, Reason};
+use crate::{Action, ActionId, ActionRecord, ActionResult, Engine, Graph, Input, InputRecord, Reason};
 
 /// What a run would do with an action.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,11 +44,8 @@ pub(crate) enum Standing {
 
 impl Engine {
     /// What [`Engine::run`] would do with each action, in the graph's order.
-    ///
-    /// # Errors
-    /// The store cannot be read.
-    pub fn forecast(&self, graph: &Graph) -> Result<Vec<Forecast>, Error> {
-        let standings = self.survey(graph)?;
+    pub fn forecast(&self, graph: &Graph) -> Vec<Forecast> {
+        let standings = self.survey(graph);
         let forecasts = graph.iter().zip(standings).map(|((_, action), standing)| {
             let last_ms = || self.history(&action.name).map(|(record, _)| record.result.wall_ms);
             match standing {
@@ -62,11 +59,11 @@ impl Engine {
                 }
             }
         });
-        Ok(forecasts.collect())
+        forecasts.collect()
     }
 
     /// Settles what needs no work, in the graph's order, which has every input before its reader.
-    pub(crate) fn survey(&self, graph: &Graph) -> Result<Vec<Standing>, Error> {
+    pub(crate) fn survey(&self, graph: &Graph) -> Vec<Standing> {
         let mut standings: Vec<Standing> = Vec::with_capacity(graph.len());
         for (_, action) in graph.iter() {
             let outcome = |id: ActionId| match &standings[id.0] {
@@ -80,7 +77,7 @@ impl Engine {
                 }
                 Declared::Ready(inputs) => {
                     let record = unperformed(action, inputs);
-                    match self.look_up(&record)? {
+                    match self.look_up(&record) {
                         Some(record) => {
                             Standing::Settled(Outcome { status: Status::Reused, record: Some(record) })
                         }
@@ -91,7 +88,7 @@ impl Engine {
             standings.push(standing);
         }
         self.make_lost_ones_due(graph, &mut standings);
-        Ok(standings)
+        standings
     }
 
     /// From the readers to what they read: an action whose result is known, but no longer in the store, is due if that
@@ -121,15 +118,16 @@ impl Engine {
     }
 
     /// The result for these inputs, if it is known; what it made may be gone from the store.
-    pub(crate) fn look_up(&self, unperformed: &ActionRecord) -> Result<Option<Arc<ActionRecord>>, Error> {
+    pub(crate) fn look_up(&self, unperformed: &ActionRecord) -> Option<Arc<ActionRecord>> {
         let key = unperformed.key();
         if let Some(memory) = self.memory().actions.get(&unperformed.name)
             && memory.key == key
         {
-            return Ok(Some(memory.record.clone()));
+            return Some(memory.record.clone());
         }
-        let found = self.store().record(&key)?;
-        Ok(found.map(|record| Arc::new(ActionRecord { name: unperformed.name.clone(), ..record })))
+        // Whoever made it may call itself and what it read otherwise.
+        let result = self.store().record(&key)?.result;
+        Some(Arc::new(ActionRecord { result, ..unperformed.clone() }))
     }
 
     /// Why an action for which there is no result must run.
@@ -151,7 +149,7 @@ impl Engine {
             match input {
                 Input::Source { path, digest } => {
                     let bytes = if digest.is_some() { self.sources().bytes(path) } else { 0 };
-                    inputs.push(InputRecord { name: path.clone(), digest: *digest, bytes });
+                    inputs.push(InputRecord { name: path.clone(), digest: *digest, bytes, made_as: None });
                 }
                 Input::Output { action: upstream, output } => {
                     let name = &graph.action(*upstream).name;
@@ -163,7 +161,8 @@ impl Engine {
                     };
                     let Some(made) = outcome.output(output) else { return Declared::Blocked(name.clone()) };
                     let name = format!("{name}/{output}");
-                    inputs.push(InputRecord { name, digest: Some(made.digest), bytes: made.bytes });
+                    let made_as = Some(output.clone());
+                    inputs.push(InputRecord { name, digest: Some(made.digest), bytes: made.bytes, made_as });
                 }
             }
         }

@@ -18,7 +18,7 @@ pub(crate) enum BuildResult {
     Cancelled(Batch),
     /// The tool could not do its work; what was published stays.
     Failed(Error),
-    /// The build is done and published, but its files could not be written.
+    /// The build is done and published, but its files or the memory of it could not be written.
     OutputsFailed(Error),
 }
 
@@ -43,6 +43,7 @@ impl Drop for Builder {
 pub(crate) struct BuilderOptions {
     pub(crate) jobs: usize,
     pub(crate) memory_bytes: u64,
+    pub(crate) cache_bytes_max: u64,
     pub(crate) write_outputs: bool,
 }
 
@@ -89,7 +90,7 @@ impl BuilderThread {
             let changed: Option<Vec<String>> =
                 (knows_all && !batch.files.is_empty()).then(|| batch.files.iter().cloned().collect());
             // No collection may take what a build counts on.
-            let _hold = self.engine.store().hold();
+            let hold = self.engine.store().hold();
             match Self::guarded(|| self.build(changed.as_deref())) {
                 Ok(None) => built(BuildResult::Cancelled(batch)),
                 Ok(Some(done)) => {
@@ -97,21 +98,24 @@ impl BuilderThread {
                     let (targets, output_dir) = (done.targets.clone(), done.plan.project.output_dir.clone());
                     built(BuildResult::Done(Box::new(to_table(done, batch))));
                     // Clients first; files for engines and the memory can follow.
-                    let finish = || {
-                        if self.options.write_outputs {
-                            write_outputs(&self.engine, &targets, &output_dir)?;
-                        }
-                        self.engine.save_memory()
+                    let write = || match self.options.write_outputs {
+                        true => write_outputs(&self.engine, &targets, &output_dir).map(drop),
+                        false => Ok(()),
                     };
-                    if let Err(error) = Self::guarded(finish) {
-                        built(BuildResult::OutputsFailed(error));
-                    }
+                    let results = [Self::guarded(write), Self::guarded(|| self.engine.save_memory())];
+                    results
+                        .into_iter()
+                        .filter_map(Result::err)
+                        .for_each(|error| built(BuildResult::OutputsFailed(error)));
                 }
                 Err(error) => {
                     knows_all = false;
                     built(BuildResult::Failed(error));
                 }
             }
+            drop(hold);
+            // What cannot be collected now can be later.
+            let _ = self.engine.store().collect_if_due(self.options.cache_bytes_max);
         }
     }
 

@@ -1,6 +1,5 @@
 //! The loop.
 
-use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -23,6 +22,8 @@ pub struct DaemonOptions {
     pub jobs: usize,
     /// What the actions at work may take together, in bytes.
     pub memory_bytes: u64,
+    /// What the cache may keep besides what is published, in bytes.
+    pub cache_bytes_max: u64,
     /// Whether baked files are written after each build.
     pub write_outputs: bool,
 }
@@ -124,7 +125,7 @@ impl Daemon {
         let blobs = engine.clone();
         let lost = sender.clone();
         let blobs = Box::new(move |digest: &_| {
-            let bytes = blobs.store().get(digest).ok().flatten();
+            let bytes = blobs.store().get(digest);
             if bytes.is_none() {
                 // Fails only when the daemon has ended.
                 let _ = lost.send(Event::ContentLost);
@@ -140,6 +141,7 @@ impl Daemon {
         let builder_options = BuilderOptions {
             jobs: options.jobs,
             memory_bytes: options.memory_bytes,
+            cache_bytes_max: options.cache_bytes_max,
             write_outputs: options.write_outputs,
         };
         let builder = Builder::start(engine.clone(), server.clone(), builder_options, move |result| {
@@ -211,6 +213,13 @@ impl Daemon {
         let is_failure = matches!(result, BuildResult::Failed(_));
         let mut unseen = match &result {
             // The next build may be running already.
+            // Something damaged was dropped: it must be made anew.
+            BuildResult::OutputsFailed(Error::Lost { .. }) => {
+                if self.building.is_none() {
+                    self.begin_build(Batch::default());
+                }
+                return;
+            }
             BuildResult::OutputsFailed(error) => return notify(Notice::Failed(error.to_string())),
             BuildResult::Cancelled(batch) => batch.clone(),
             BuildResult::Done(_) | BuildResult::Failed(_) => Batch::default(),
@@ -229,13 +238,11 @@ impl Daemon {
             // A plan that broke off has not looked at everything that matters.
             relevant.extend(std::mem::take(&mut self.relevant));
         }
-        if relevant != self.relevant {
-            self.watch.set_relevant(&relevant);
-            let old: HashSet<&String> = self.relevant.iter().collect();
-            let new = relevant.iter().filter(|path| !old.contains(path));
-            unseen.merge(Batch::now(sources.changed_since_seen(new)));
-            self.relevant = relevant;
-        }
+        // A link may lead elsewhere now, and a file system may not tell of every change: after each build all files are
+        // looked at, by `stat` alone.
+        self.watch.set_relevant(&relevant);
+        unseen.merge(Batch::now(sources.changed_since_seen(&relevant)));
+        self.relevant = relevant;
         if !unseen.files.is_empty() {
             notify(Notice::Building { files: unseen.files.iter().cloned().collect() });
             self.begin_build(unseen);

@@ -17,10 +17,8 @@ fn names(files: &[&str]) -> BTreeSet<String> {
 
 fn changes(kind: EventKind, path: &str) -> BTreeSet<String> {
     let relevant = ["/p/kiln.toml", "/p/shaders/a.wgsl", "/p/shaders/lib/b.wgsl", "/p/shaders2/c.wgsl"];
-    let relevant: BTreeMap<PathBuf, String> = relevant
-        .iter()
-        .map(|path| (PathBuf::from(path), path.trim_start_matches("/p/").to_owned()))
-        .collect();
+    let named = |path: &&str| (PathBuf::from(path), names(&[path.trim_start_matches("/p/")]));
+    let relevant: BTreeMap<PathBuf, BTreeSet<String>> = relevant.iter().map(named).collect();
     let event = notify::Event::new(kind).add_path(PathBuf::from(path));
     name_changes(&Ok(event), Path::new("/p"), &Mutex::new(relevant))
 }
@@ -42,7 +40,7 @@ fn event_of_a_folder_is_about_all_that_lies_below_it() {
 
 #[test]
 fn queue_overflow_is_about_everything() {
-    let relevant = Mutex::new(BTreeMap::from([(PathBuf::from("/p/a"), "a".to_owned())]));
+    let relevant = Mutex::new(BTreeMap::from([(PathBuf::from("/p/a"), names(&["a"]))]));
     let lost = notify::Event::new(EventKind::Other).set_flag(notify::event::Flag::Rescan);
     assert_eq!(name_changes(&Ok(lost), Path::new("/p"), &relevant), names(&["a"]));
     assert_eq!(name_changes(&Err(notify::Error::generic("gone")), Path::new("/p"), &relevant), names(&["a"]));
@@ -100,4 +98,18 @@ fn file_in_folders_that_appear_later_is_noticed() {
     fs::create_dir_all(project.join("a/b/c")).unwrap();
     fs::write(project.join("a/b/c/deep.wgsl"), "here").unwrap();
     assert_eq!(batches.recv_timeout(LIMIT).unwrap().files, names(&["a/b/c/deep.wgsl"]));
+}
+
+#[cfg(unix)]
+#[test]
+fn file_of_two_names_changes_under_both() {
+    let project = tempfile::tempdir().unwrap();
+    let project = project.path().canonicalize().unwrap();
+    fs::write(project.join("one.wgsl"), "before").unwrap();
+    std::os::unix::fs::symlink("one.wgsl", project.join("two.wgsl")).unwrap();
+    let (sender, batches) = channel();
+    let mut watch = Watch::start(&project, move |batch| drop(sender.send(batch))).unwrap();
+    watch.set_relevant(&["one.wgsl".to_owned(), "two.wgsl".to_owned()]);
+    fs::write(project.join("one.wgsl"), "after").unwrap();
+    assert_eq!(batches.recv_timeout(LIMIT).unwrap().files, names(&["one.wgsl", "two.wgsl"]));
 }

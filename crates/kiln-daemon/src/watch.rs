@@ -1,6 +1,6 @@
 //! File events in, settled batches of changed paths out.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -38,12 +38,15 @@ impl Batch {
     }
 }
 
+/// Path, as named and as links lead to it, to the names that it has in the project.
+pub(crate) type Relevant = BTreeMap<PathBuf, BTreeSet<String>>;
+
 /// Watches a project's folder, and the folders of sources that lie elsewhere.
 pub(crate) struct Watch {
     watcher: RecommendedWatcher,
     folder: PathBuf,
-    /// What the last plan looked at: canonical path to its name in the project.
-    relevant: Arc<Mutex<BTreeMap<PathBuf, String>>>,
+    /// What the last plan looked at.
+    relevant: Arc<Mutex<Relevant>>,
     outside: BTreeSet<PathBuf>,
 }
 
@@ -67,18 +70,19 @@ impl Watch {
     /// Says which sources matter (project-relative, missing ones too). Those that lie outside the folder, or are
     /// links to files outside, are watched where they are.
     pub(crate) fn set_relevant(&mut self, names: &[String]) {
-        let mut relevant = BTreeMap::new();
+        let mut relevant = Relevant::new();
         let mut outside = BTreeSet::new();
+        let mut folders = HashMap::new();
         for name in names {
             let path = normalise(&self.folder.join(name));
-            let target = path.canonicalize().unwrap_or_else(|_| path.clone());
+            let target = follow_links(&path, &mut folders);
             for path in [path, target] {
                 if !path.starts_with(&self.folder)
                     && let Some(parent) = path.parent()
                 {
                     outside.insert(parent.to_owned());
                 }
-                relevant.insert(path, name.clone());
+                relevant.entry(path).or_default().insert(name.clone());
             }
         }
         *self.relevant.lock().unwrap_or_else(PoisonError::into_inner) = relevant;
@@ -90,6 +94,16 @@ impl Watch {
         };
         self.outside = outside.into_iter().filter(is_watched).collect();
     }
+}
+
+/// Where a path leads. Its folder is looked up once for all files in it.
+fn follow_links(path: &Path, folders: &mut HashMap<PathBuf, Option<PathBuf>>) -> PathBuf {
+    let is_link = path.symlink_metadata().is_ok_and(|metadata| metadata.is_symlink());
+    let (Some(folder), Some(name), false) = (path.parent(), path.file_name(), is_link) else {
+        return path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    };
+    let folder = folders.entry(folder.to_owned()).or_insert_with(|| folder.canonicalize().ok());
+    folder.as_ref().map_or_else(|| path.to_owned(), |folder| folder.join(name))
 }
 
 /// Removes `.` and `..` without asking the file system, so that missing files have one spelling too.
@@ -110,12 +124,13 @@ pub(crate) fn normalise(path: &Path) -> PathBuf {
 pub(crate) fn name_changes(
     event: &notify::Result<notify::Event>,
     folder: &Path,
-    relevant: &Mutex<BTreeMap<PathBuf, String>>,
+    relevant: &Mutex<Relevant>,
 ) -> BTreeSet<String> {
     let relevant = relevant.lock().unwrap_or_else(PoisonError::into_inner);
-    let Ok(event) = event else { return relevant.values().cloned().collect() };
+    let all = || relevant.values().flatten().cloned().collect();
+    let Ok(event) = event else { return all() };
     if event.need_rescan() {
-        return relevant.values().cloned().collect();
+        return all();
     }
     if matches!(event.kind, EventKind::Access(_)) {
         return BTreeSet::new();
@@ -127,7 +142,7 @@ pub(crate) fn name_changes(
             continue;
         }
         let below = relevant.range(path.clone()..).take_while(|(source, _)| source.starts_with(path));
-        names.extend(below.map(|(_, name)| name.clone()));
+        names.extend(below.flat_map(|(_, names)| names.clone()));
     }
     names
 }

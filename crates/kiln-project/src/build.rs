@@ -44,7 +44,10 @@ pub fn build(
         // Damage is found, and dropped, one blob at a time; a source that changed while it was read is seen as it is at
         // the second look.
         let is_healing = matches!(result, Err(Error::Lost { .. } | Error::SourceChanged { .. }));
-        if !is_healing || tries == HEALING_TRIES_MAX || options.cancel.load(Ordering::SeqCst) {
+        if is_healing && options.cancel.load(Ordering::SeqCst) {
+            return Ok(None);
+        }
+        if !is_healing || tries == HEALING_TRIES_MAX {
             return result;
         }
         changed = None;
@@ -53,7 +56,7 @@ pub fn build(
 }
 
 /// More damaged blobs than this in one build are a broken disk.
-const HEALING_TRIES_MAX: usize = 64;
+pub const HEALING_TRIES_MAX: usize = 64;
 
 fn build_once(
     engine: &Engine,
@@ -69,7 +72,7 @@ fn build_once(
     if !report.is_complete() && options.cancel.load(Ordering::SeqCst) {
         return Ok(None);
     }
-    let (targets, diagnostics) = plan.resolve(engine, &report)?;
+    let (targets, diagnostics) = plan.resolve(engine, &report);
     let targets = Arc::new(targets);
     engine.publish(&targets)?;
     Ok(Some(Built { plan, report, targets, diagnostics, plan_ms, run_ms }))

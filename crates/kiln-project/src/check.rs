@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::{Manifest, ManifestTarget};
+use crate::{MANIFEST_FILE, Manifest, ManifestTarget};
 
 /// Differences named of one target; the rest is counted.
 const DETAILS_MAX: usize = 6;
@@ -44,7 +44,16 @@ pub fn differences(committed: &Manifest, present: &Manifest) -> Vec<Difference> 
         };
         Some(Difference { target: name.clone(), kind, details })
     };
-    names.into_iter().filter_map(difference).collect()
+    let mut differences: Vec<Difference> = names.into_iter().filter_map(difference).collect();
+    if committed.writer != present.writer && !committed.targets.is_empty() {
+        let details = vec![format!("writer: {} → {}", committed.writer, present.writer)];
+        differences.push(Difference {
+            target: MANIFEST_FILE.to_owned(),
+            kind: DifferenceKind::Changed,
+            details,
+        });
+    }
+    differences
 }
 
 fn details(old: &ManifestTarget, new: &ManifestTarget) -> Vec<String> {

@@ -247,7 +247,7 @@ fn read_output_dir(section: &mut Section) -> Option<String> {
 
 fn read_env(section: &mut Section) -> EnvConfig {
     let config = EnvConfig {
-        source: section.required_text("source", "environments/sky.hdr"),
+        source: read_source(section, "environments/sky.hdr"),
         size: section.integer("size", 1..=4096).unwrap_or(256),
         irradiance_size: section.integer("irradiance_size", 1..=1024).unwrap_or(64),
         error: section.number("error", 1e-7..=1.0).unwrap_or(1e-3),
@@ -277,6 +277,18 @@ fn read_env(section: &mut Section) -> EnvConfig {
     config
 }
 
+/// A source's path, in the one spelling by which the rest knows it.
+fn read_source(section: &mut Section, example: &'static str) -> String {
+    let path = section.required_text("source", example).replace('\\', "/");
+    let parts: Vec<&str> = path
+        .split('/')
+        .enumerate()
+        .filter(|(at, part)| *at == 0 || !part.is_empty())
+        .map(|(_, part)| part)
+        .collect();
+    parts.into_iter().filter(|part| *part != ".").collect::<Vec<_>>().join("/")
+}
+
 fn read_scene(section: &mut Section, envs: &[String], shaders: &[String]) -> SceneConfig {
     let mut reference = |key: &'static str, declared: &[String], default: &str| {
         let name = section.text(key).unwrap_or_else(|| default.to_owned());
@@ -291,7 +303,7 @@ fn read_scene(section: &mut Section, envs: &[String], shaders: &[String]) -> Sce
     SceneConfig {
         env: reference("env", envs, &first_env),
         shader: reference("shader", shaders, "pbr"),
-        source: section.required_text("source", "scenes/scene.gltf"),
+        source: read_source(section, "scenes/scene.gltf"),
     }
 }
 
@@ -300,7 +312,7 @@ fn read_shader(section: &mut Section, name: &str) -> ShaderConfig {
     // A shader named after a role has it.
     let by_name = roles.iter().find(|(role, _)| *role == name).map_or(Role::Material, |(_, role)| *role);
     ShaderConfig {
-        source: section.required_text("source", "shaders/pbr/pbr.wgsl"),
+        source: read_source(section, "shaders/pbr/pbr.wgsl"),
         role: section.choice("role", &roles).unwrap_or(by_name),
     }
 }

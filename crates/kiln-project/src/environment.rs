@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use kiln_bake::{
-    Accuracy, Analysis, AnalysisRequest, BakeError, Cancel, Cancelled, EncodedLevel, TexelFormat,
+    Accuracy, Analysis, AnalysisRequest, BakeError, Bulk, Cancel, Cancelled, EncodedLevel, TexelFormat,
 };
 use kiln_build::{
     Action, ActionId, ActionOutput, Command, Engine, Error, Input, Inputs, MemoryNeed, little_memory,
@@ -141,7 +141,8 @@ impl Steps<'_> {
         let command = command("analyse", 1, params, &["analysis"]);
         let action = self.action("", command, vec![output(decode, "panorama")], move |inputs| {
             let cancel = cancel(inputs);
-            let analysis = kiln_bake::analyse(&panorama(inputs, 0)?, &request, cancel).map_err(ended)?;
+            let panorama = panorama(inputs, 0)?;
+            let analysis = kiln_bake::analyse(&panorama, &request, cancel).map_err(ended)?;
             let meta = json!({"detail": {"band_limit": analysis.band_limit(), "mean": analysis.mean()}});
             Ok(success("analysis", analysis.to_bytes(cancel).map_err(ended)?, meta))
         });
@@ -190,7 +191,10 @@ impl Steps<'_> {
         Action {
             memory: needs(move |lengths| {
                 let (width, height) = panorama_size(lengths[0]);
-                kiln_bake::memory::skybox(width, height, skybox_face_size(width).max(mirror_size))
+                let own = skybox_face_size(width);
+                let mirror =
+                    if mirror_size > own { kiln_bake::memory::skybox(width, height, mirror_size) } else { 0 };
+                kiln_bake::memory::skybox(width, height, own) + mirror
             }),
             ..action
         }
@@ -209,7 +213,7 @@ impl Steps<'_> {
             let detail = accuracy_facts(&map.accuracy);
             Encode::new(&env, &report(inputs, 1)?).output(LEVEL, &map.cube, detail, cancel)
         });
-        Action { memory: memory, ..action }
+        Action { memory, ..action }
     }
 
     fn sh(&self, analyse: ActionId) -> Action {
@@ -247,7 +251,7 @@ impl Steps<'_> {
             detail["roughness"] = json!(roughness);
             Encode::new(&env, &report(inputs, 1)?).output(LEVEL, &map.cube, detail, cancel)
         });
-        Action { memory: memory, ..action }
+        Action { memory, ..action }
     }
 }
 
@@ -283,7 +287,9 @@ fn decode(bytes: &[u8], policy: TexelPolicy, cancel: Cancel) -> Result<ActionOut
     };
     let report = serde_json::to_vec(&Report { width, height, max }).unwrap_or_default();
     let meta = json!({"detail": {"format": format, "width": width, "height": height, "max": max}});
-    let outputs = vec![("panorama".to_owned(), encode_panorama(&panorama)), ("report".to_owned(), report)];
+    let panorama = Bulk::new(panorama);
+    let stored = encode_panorama(&panorama, cancel).map_err(ended)?;
+    let outputs = vec![("panorama".to_owned(), stored), ("report".to_owned(), report)];
     Ok(ActionOutput { outputs, meta, diagnostics })
 }
 
@@ -368,8 +374,9 @@ pub(crate) fn failure(diagnostic: Diagnostic) -> ActionOutput {
     ActionOutput { outputs: Vec::new(), meta: Value::Null, diagnostics: vec![diagnostic] }
 }
 
-fn panorama(inputs: &Inputs, index: usize) -> Result<Panorama, Error> {
-    decode_panorama(&inputs.required(index)?)
+/// Freed elsewhere: giving a large one back to the system takes longer than a cancelled step may go on.
+fn panorama(inputs: &Inputs, index: usize) -> Result<Bulk<Panorama>, Error> {
+    decode_panorama(&inputs.required(index)?, cancel(inputs)).map(Bulk::new)
 }
 
 fn analysis(inputs: &Inputs, index: usize) -> Result<Analysis, Error> {

@@ -9,7 +9,7 @@
 //!
 //! Not here: how maps are computed (`kiln-bake`), caching (`kiln-build`), watching (`kiln-daemon`).
 
-pub use build::{Built, build};
+pub use build::{Built, HEALING_TRIES_MAX, build};
 // The limits of an environment are those of its recipe.
 pub use check::{Difference, DifferenceKind, differences};
 pub use config::{EnvConfig, Project, Range, Role, SceneConfig, ShaderConfig, parse_project};

@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 use std::path::{Component, Path};
 use std::sync::Arc;
 
-use kiln_build::{Digest, Engine, Error, Store, Target, TargetState, Targets, write_atomically};
+use kiln_build::{
+    Digest, Engine, Error, FilesOfTarget, Store, Target, TargetState, Targets, write_atomically,
+};
 use kiln_image::ktx2;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -61,7 +63,7 @@ impl Manifest {
 
     /// Length of all files.
     pub fn bytes(&self) -> u64 {
-        self.targets.values().map(ManifestTarget::bytes).sum()
+        self.targets.values().map(ManifestTarget::bytes).fold(0, u64::saturating_add)
     }
 
     fn text(&self) -> Vec<u8> {
@@ -74,7 +76,7 @@ impl Manifest {
 impl ManifestTarget {
     /// Length of its files.
     pub fn bytes(&self) -> u64 {
-        self.files.values().map(|file| file.bytes).sum()
+        self.files.values().map(|file| file.bytes).fold(0, u64::saturating_add)
     }
 }
 
@@ -91,27 +93,22 @@ pub struct Written {
     pub manifest: Manifest,
 }
 
-/// The manifest that [`write_outputs`] would write. Files of targets that `known` has as they are need not be made again.
+/// The manifest that [`write_outputs`] would write.
 ///
 /// # Errors
 /// A target's content cannot be read from the store.
-pub fn manifest_of(store: &Store, targets: &Targets, known: &Manifest) -> Result<Manifest, Error> {
+pub fn manifest_of(engine: &Engine, targets: &Targets) -> Result<Manifest, Error> {
     let mut manifest = empty_manifest();
     for (name, target) in targets {
         let sha256 = target.digest();
-        let files = match known.unchanged(name, sha256) {
-            Some(known) => known.files.clone(),
-            None => {
-                target_files(store, name, target)?.iter().map(|(path, bytes)| entry(path, bytes)).collect()
-            }
-        };
-        manifest.targets.insert(name.clone(), manifest_target(target, sha256, files));
+        let files = known_files(engine, name, target, sha256)?;
+        manifest.targets.insert(name.clone(), manifest_target(target, sha256, &files));
     }
     Ok(manifest)
 }
 
-/// Writes the files of every target that changed since the folder's manifest was written, or that are no longer as it
-/// says, and the manifest.
+/// Writes every file that is not there as the targets make it, and the manifest. What a manifest in the folder says is
+/// not believed.
 ///
 /// # Errors
 /// A file cannot be read from the store or written.
@@ -123,37 +120,34 @@ pub fn write_outputs(engine: &Engine, targets: &Targets, output_dir: &str) -> Re
     let folder = engine.folder().join(output_dir);
     let old_text = std::fs::read(folder.join(MANIFEST_FILE)).unwrap_or_default();
     let old = Manifest::parse(&old_text).unwrap_or_default();
-    let is_as_stated = |(path, file): (&String, &ManifestFile)| {
+    let manifest = manifest_of(engine, targets)?;
+    let is_there = |path: &str, file: &ManifestFile| {
         outputs.state(&format!("{output_dir}/{path}")).digest() == Some(file.sha256)
     };
-    let mut manifest = empty_manifest();
+    let mut written = Written::default();
     let mut changed = Vec::new();
-    for (name, target) in targets {
-        let sha256 = target.digest();
-        match old.unchanged(name, sha256).filter(|known| known.files.iter().all(is_as_stated)) {
-            Some(known) => {
-                manifest.targets.insert(name.clone(), manifest_target(target, sha256, known.files.clone()));
-            }
-            None => changed.push((name, target, sha256)),
+    for (name, target) in &manifest.targets {
+        let missing: Vec<&String> =
+            target.files.iter().filter(|(path, file)| !is_there(path, file)).map(|(path, _)| path).collect();
+        written.kept += target.files.len() - missing.len();
+        if !missing.is_empty() {
+            changed.push((name, missing));
         }
     }
-    let mut written = Written {
-        kept: manifest.targets.values().map(|target| target.files.len()).sum(),
-        ..Written::default()
-    };
     let fs = engine.store().file_system();
-    if !changed.is_empty() && !old.targets.is_empty() {
+    if !changed.is_empty() && !old_text.is_empty() {
         // Until the files are written nothing may vouch for them.
-        write_atomically(fs, &folder.join(MANIFEST_FILE), &manifest.text())?;
+        let mut vouched = manifest.clone();
+        changed.iter().for_each(|(name, _)| _ = vouched.targets.remove(*name));
+        write_atomically(fs, &folder.join(MANIFEST_FILE), &vouched.text())?;
     }
-    for (name, target, sha256) in changed {
-        let mut files = BTreeMap::new();
-        for (path, bytes) in target_files(engine.store(), name, target)? {
-            write_atomically(fs, &folder.join(&path), &bytes)?;
-            files.extend([entry(&path, &bytes)]);
-            written.written.push(path);
+    for (name, missing) in changed {
+        for (path, bytes) in target_files(engine.store(), name, &targets[name])? {
+            if missing.contains(&&path) {
+                write_atomically(fs, &folder.join(&path), &bytes)?;
+                written.written.push(path);
+            }
         }
-        manifest.targets.insert(name.clone(), manifest_target(target, sha256, files));
     }
     remove_orphans(&folder, &old, &manifest, &mut written);
     let text = manifest.text();
@@ -169,14 +163,24 @@ fn empty_manifest() -> Manifest {
     Manifest { schema: MANIFEST_SCHEMA, writer: WRITER_RECIPE, targets: BTreeMap::new() }
 }
 
-impl Manifest {
-    /// The entry of a target, if files made of this content are the same today.
-    fn unchanged(&self, name: &str, sha256: Digest) -> Option<&ManifestTarget> {
-        self.targets.get(name).filter(|known| known.sha256 == sha256 && self.writer == WRITER_RECIPE)
+/// What is made of a target: remembered, or made and noted.
+fn known_files(engine: &Engine, name: &str, target: &Target, sha256: Digest) -> Result<FilesOfTarget, Error> {
+    if let Some(known) = engine.files_of(name, sha256, WRITER_RECIPE) {
+        return Ok(known);
     }
+    let files = target_files(engine.store(), name, target)?;
+    let files =
+        files.iter().map(|(path, bytes)| (path.clone(), Digest::of(bytes), bytes.len() as u64)).collect();
+    let files = FilesOfTarget { target: sha256, maker: WRITER_RECIPE, files };
+    engine.note_files(name, files.clone());
+    Ok(files)
 }
 
-fn manifest_target(target: &Target, sha256: Digest, files: BTreeMap<String, ManifestFile>) -> ManifestTarget {
+fn manifest_target(target: &Target, sha256: Digest, files: &FilesOfTarget) -> ManifestTarget {
+    let file = |(path, sha256, bytes): &(String, Digest, u64)| {
+        (path.clone(), ManifestFile { sha256: *sha256, bytes: *bytes })
+    };
+    let files = files.files.iter().map(file).collect();
     ManifestTarget {
         kind: target.kind.clone(),
         sha256,
@@ -184,10 +188,6 @@ fn manifest_target(target: &Target, sha256: Digest, files: BTreeMap<String, Mani
         files,
         facts: target.meta.clone(),
     }
-}
-
-fn entry(path: &str, bytes: &[u8]) -> (String, ManifestFile) {
-    (path.to_owned(), ManifestFile { sha256: Digest::of(bytes), bytes: bytes.len() as u64 })
 }
 
 fn remove_orphans(folder: &Path, old: &Manifest, new: &Manifest, written: &mut Written) {
@@ -210,7 +210,7 @@ fn target_files(store: &Store, name: &str, target: &Target) -> Result<Vec<Output
     let mut contents = Vec::with_capacity(target.parts.len());
     for part in &target.parts {
         let lost = || Error::Lost { what: format!("{} of {name}", part.name) };
-        contents.push((part.name.as_str(), store.get(&part.digest)?.ok_or_else(lost)?));
+        contents.push((part.name.as_str(), store.get(&part.digest).ok_or_else(lost)?));
     }
     Ok(match target.kind.as_str() {
         "cube" | "lut" => vec![(format!("{name}.ktx2"), texture_file(name, target, &contents).into())],

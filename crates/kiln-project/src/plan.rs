@@ -199,10 +199,7 @@ impl Plan {
 
     /// Joins what the actions made into targets. One whose actions failed keeps the content that was published last,
     /// marked stale; one that nothing asks for any more goes, unless an error may be what hides the wish for it.
-    ///
-    /// # Errors
-    /// What was published last cannot be read.
-    pub fn resolve(&self, engine: &Engine, report: &RunReport) -> Result<(Targets, Vec<Diagnostic>), Error> {
+    pub fn resolve(&self, engine: &Engine, report: &RunReport) -> (Targets, Vec<Diagnostic>) {
         let mut diagnostics = self.diagnostics.clone();
         for (action, diagnostic) in report.diagnostics() {
             let diagnostic = self.with_subject(action, diagnostic);
@@ -212,8 +209,9 @@ impl Plan {
         }
         let mut targets = Targets::new();
         if has_errors(&diagnostics) {
-            let last = engine.published()?;
-            targets.extend(last.iter().map(|(name, target)| (name.clone(), target.clone().into_stale())));
+            let published = engine.published();
+            let last_good = |name: &String| Some((name.clone(), engine.last_good(name)?.into_stale()));
+            targets.extend(published.keys().filter_map(last_good));
         }
         for spec in &self.targets {
             if let Some(target) = resolve_target(spec, report) {
@@ -225,11 +223,11 @@ impl Plan {
                     format!("`{}` was made, but not all of its parts; this is a fault of Kiln", spec.name);
                 diagnostics.push(Diagnostic::error(message));
             }
-            if let Some(target) = engine.published()?.get(&spec.name) {
-                targets.insert(spec.name.clone(), target.clone().into_stale());
+            if let Some(target) = engine.last_good(&spec.name) {
+                targets.insert(spec.name.clone(), target.into_stale());
             }
         }
-        Ok((targets, diagnostics))
+        (targets, diagnostics)
     }
 }
 

@@ -194,9 +194,10 @@ pub fn suggest<'a>(written: &str, known: impl Iterator<Item = &'a str>) -> Optio
     (best.0 > 0.75).then(|| format!("did you mean `{}`?", best.1))
 }
 
-/// A number of bytes from a text as `200000`, `64 MiB`, `1.5GB`; units of 1024 with `i`, of 1000 without.
+/// A number of bytes from a text as `200000`, `64 MiB`, `1.5GB`. `K`, `M` and `G` alone, and with `iB`, are powers of 1024;
+/// with `B` they are powers of 1000.
 pub fn parse_bytes(text: &str) -> Option<u64> {
-    const UNITS: [(&str, f64); 11] = [
+    const UNITS: [(&str, f64); 14] = [
         ("", 1.0),
         ("B", 1.0),
         ("K", 1024.0),
@@ -205,9 +206,12 @@ pub fn parse_bytes(text: &str) -> Option<u64> {
         ("KiB", 1024.0),
         ("MiB", 1_048_576.0),
         ("GiB", 1_073_741_824.0),
+        ("TiB", 1_099_511_627_776.0),
         ("kB", 1e3),
+        ("KB", 1e3),
         ("MB", 1e6),
         ("GB", 1e9),
+        ("TB", 1e12),
     ];
     let text = text.trim();
     let end =
@@ -216,5 +220,5 @@ pub fn parse_bytes(text: &str) -> Option<u64> {
     let scale = UNITS.iter().find(|(name, _)| *name == unit.trim())?.1;
     let bytes = number.parse::<f64>().ok()? * scale;
     // Up to 2^53 every whole number of bytes is exact.
-    (bytes >= 0.0 && bytes < 9e15).then_some(bytes as u64)
+    (0.0..9e15).contains(&bytes).then_some(bytes as u64)
 }

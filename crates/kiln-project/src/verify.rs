@@ -1,8 +1,9 @@
 //! Whether a build elsewhere makes the same bytes.
 
+use std::collections::HashMap;
 use std::path::{Component, Path, PathBuf};
 
-use kiln_build::{Digest, Engine, Error, Outcome, RunOptions, Store};
+use kiln_build::{ActionRecord, Digest, Engine, Error, Forecast, Outcome, RunOptions, Store};
 use serde::Serialize;
 
 use crate::plan::plan;
@@ -44,6 +45,9 @@ pub enum VerifyError {
     /// A target's actions have not all run from the sources as they are.
     #[error("{0} is not up to date: bake first")]
     OutOfDate(String),
+    /// A target's sources have an error, so there is nothing to compare.
+    #[error("the input of `{0}` is at fault: bake says how")]
+    AtFault(String),
     /// The fresh folder cannot be made.
     #[error("cannot copy {path} to a fresh folder: {source}")]
     Copy {
@@ -69,9 +73,13 @@ pub fn verify(engine: &Engine, targets: &[String], options: &RunOptions) -> Resu
         wanted.extend(here.actions_of(target).unwrap_or_default());
     }
     let (graph, ids) = here.graph.only(&here.graph.with_upstream(&wanted));
-    let forecasts = engine.forecast(&graph)?;
-    if let Some(at) = forecasts.iter().position(|forecast| *forecast != kiln_build::Forecast::UpToDate) {
-        return Err(VerifyError::OutOfDate(here.graph.action(ids[at]).name.clone()));
+    for (id, forecast) in ids.iter().zip(engine.forecast(&graph)) {
+        let name = || here.graph.action(*id).name.clone();
+        match forecast {
+            Forecast::UpToDate => {}
+            Forecast::Failed | Forecast::Blocked { .. } => return Err(VerifyError::AtFault(name())),
+            Forecast::Runs { .. } | Forecast::MayRun { .. } => return Err(VerifyError::OutOfDate(name())),
+        }
     }
     // Nothing runs: all of it is up to date.
     let stored = engine.run(&graph, options)?;
@@ -96,28 +104,47 @@ pub fn verify(engine: &Engine, targets: &[String], options: &RunOptions) -> Resu
         bytes: 0,
         mismatches: Vec::new(),
     };
-    for outcome in &stored.outcomes {
-        compare(outcome, &made.outcomes, &mut verified);
+    let fresh: HashMap<&str, &Outcome> = made
+        .outcomes
+        .iter()
+        .filter_map(|outcome| Some((outcome.record.as_ref()?.name.as_str(), outcome)))
+        .collect();
+    for record in stored.outcomes.iter().filter_map(|outcome| outcome.record.as_ref()) {
+        compare(engine, record, fresh.get(record.name.as_str()).copied(), &mut verified);
     }
     Ok(verified)
 }
 
-fn compare(stored: &Outcome, fresh: &[Outcome], verified: &mut Verified) {
-    let Some(record) = &stored.record else { return };
-    let twin =
-        fresh.iter().find(|outcome| outcome.record.as_ref().is_some_and(|fresh| fresh.name == record.name));
+fn compare(engine: &Engine, record: &ActionRecord, fresh: Option<&Outcome>, verified: &mut Verified) {
     for output in &record.result.outputs {
         verified.outputs += 1;
         verified.bytes += output.bytes;
-        let fresh = twin.and_then(|twin| twin.output(&output.name)).map(|output| output.digest);
-        if fresh != Some(output.digest) {
-            verified.mismatches.push(Mismatch {
-                action: record.name.clone(),
-                output: output.name.clone(),
-                stored: Some(output.digest),
-                fresh,
-            });
+        // Intermediate results may be gone; what is there must be what its name says.
+        let is_damaged = engine.store().contains(&output.digest, output.bytes)
+            && engine.store().get(&output.digest).is_none();
+        let stored = (!is_damaged).then_some(output.digest);
+        let fresh = fresh.and_then(|fresh| fresh.output(&output.name)).map(|output| output.digest);
+        if stored != fresh {
+            verified.mismatch(record, &output.name, stored, fresh);
         }
+    }
+    let facts = |record: &ActionRecord| Digest::of(record.result.meta.to_string().as_bytes());
+    let fresh = fresh.and_then(|fresh| fresh.record.as_deref()).map(facts);
+    if fresh != Some(facts(record)) {
+        verified.mismatch(record, "its facts", Some(facts(record)), fresh);
+    }
+}
+
+impl Verified {
+    fn mismatch(
+        &mut self,
+        record: &ActionRecord,
+        output: &str,
+        stored: Option<Digest>,
+        fresh: Option<Digest>,
+    ) {
+        let (action, output) = (record.name.clone(), output.to_owned());
+        self.mismatches.push(Mismatch { action, output, stored, fresh });
     }
 }
 

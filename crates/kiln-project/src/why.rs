@@ -1,6 +1,6 @@
 //! Why a target is as it is: what changed when, and why the rest was left alone.
 
-use kiln_build::{ActionId, BuildNote, ChangeNote, Digest, Engine, Error, Forecast, Graph, Input};
+use kiln_build::{ActionId, BuildNote, ChangeNote, Digest, Engine, Forecast, Graph, Input};
 use serde::Serialize;
 
 use crate::Plan;
@@ -35,14 +35,11 @@ pub struct CutOff {
 
 /// Explains the actions of a target, or one action, and everything they read from: what is nearest to the target comes
 /// first. `None` if the plan has nothing of that name.
-///
-/// # Errors
-/// The store cannot be read.
-pub fn why(engine: &Engine, plan: &Plan, name: &str) -> Result<Option<Vec<ActionWhy>>, Error> {
-    let Some(first) = plan.actions_of(name) else { return Ok(None) };
-    let forecasts = engine.forecast(&plan.graph)?;
+pub fn why(engine: &Engine, plan: &Plan, name: &str) -> Option<Vec<ActionWhy>> {
+    let first = plan.actions_of(name)?;
+    let forecasts = engine.forecast(&plan.graph);
     let explain = |id: ActionId| explain(engine, &plan.graph, id, &forecasts[id.index()]);
-    Ok(Some(plan.graph.with_upstream(&first).into_iter().map(explain).collect()))
+    Some(plan.graph.with_upstream(&first).into_iter().map(explain).collect())
 }
 
 /// The last build that changed something in this project.

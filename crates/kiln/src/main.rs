@@ -64,7 +64,5 @@ fn main() -> ExitCode {
 }
 
 fn is_disk_full(error: &anyhow::Error) -> bool {
-    error.chain().filter_map(|cause| cause.downcast_ref::<std::io::Error>()).any(|cause| {
-        matches!(cause.kind(), std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded)
-    })
+    error.downcast_ref::<kiln_build::Error>().is_some_and(kiln_build::Error::is_disk_full)
 }

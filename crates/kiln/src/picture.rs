@@ -168,7 +168,7 @@ impl Picture {
             x.push(left);
             left += column.iter().map(|&index| width(&self.nodes[index])).max().unwrap_or(0) + COLUMN_GAP;
         }
-        let total_width = (left - COLUMN_GAP + MARGIN).max(640);
+        let total_width = (left.saturating_sub(COLUMN_GAP) + MARGIN).max(640);
         let rows = columns.iter().map(Vec::len).max().unwrap_or(0);
         let top = MARGIN + ROW + 8;
         let height = top + rows * ROW + MARGIN;

@@ -4,15 +4,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
-use std::time::Duration;
 
 use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
-use kiln_build::{CollectOptions, Engine, Error, Progress, RunOptions, Status, Store};
+use kiln_build::{Engine, Error, Progress, RunOptions, Status, Store};
 use kiln_diagnostic::{Diagnostic, has_errors};
 use kiln_project::{
-    Built, Difference, DifferenceKind, MANIFEST_FILE, Manifest, Written, build, differences, manifest_of,
-    write_outputs,
+    Built, Difference, DifferenceKind, HEALING_TRIES_MAX, MANIFEST_FILE, Manifest, Written, build,
+    differences, manifest_of, write_outputs,
 };
 use serde_json::json;
 
@@ -21,19 +20,21 @@ use crate::ci::{self, TestCase};
 use crate::out::say;
 use crate::{INPUT_IS_WRONG, place, report};
 
-/// The cache is looked over after a bake if that was not done for this long.
-const COLLECTION_INTERVAL: Duration = Duration::from_secs(24 * 3600);
-
 pub(crate) fn run(args: &BakeArgs) -> anyhow::Result<ExitCode> {
     let engine = place::open_engine(&args.build.dir)?;
     let cache_bytes_max = place::cache_bytes_max()?;
     let hold = engine.store().hold();
+    let mut tries = 0;
     let (built, effect) = loop {
         let built = build_with_progress(&engine, args)?;
         match apply(&engine, args, &built) {
             Ok(effect) => break (built, effect),
             // A damaged artefact was found and dropped: the next build makes it anew.
-            Err(error) if matches!(error.downcast_ref(), Some(Error::Lost { .. })) => {}
+            Err(error)
+                if matches!(error.downcast_ref(), Some(Error::Lost { .. })) && tries < HEALING_TRIES_MAX =>
+            {
+                tries += 1;
+            }
             Err(error) => return Err(error),
         }
     };
@@ -44,10 +45,9 @@ pub(crate) fn run(args: &BakeArgs) -> anyhow::Result<ExitCode> {
         kiln_build::write_atomically(&kiln_build::Disk, path, xml.as_bytes())
             .context("writing the JUnit report")?;
     }
-    if args.build.json {
-        say!("{:#}", report.to_json())
-    } else {
-        report.print(args.timings)
+    match args.build.json {
+        true => say!("{:#}", report.to_json()),
+        false => report.print(args.timings),
     }
     if let Some(host) = args.annotate {
         let below = below_repository(&args.build.dir);
@@ -97,8 +97,15 @@ fn apply(engine: &Engine, args: &BakeArgs, built: &Built) -> anyhow::Result<Effe
             );
         }
     };
-    let present = manifest_of(engine.store(), &built.targets, &committed)?;
-    Ok(Effect::Checked(differences(&committed, &present), present))
+    let present = manifest_of(engine, &built.targets)?;
+    let mut found = differences(&committed, &present);
+    // What was not made says nothing of what it would be.
+    let is_made = |name: &str| {
+        let spec = built.plan.targets.iter().find(|spec| spec.name == name);
+        spec.is_none_or(|spec| built.trouble_of(spec).is_none())
+    };
+    found.retain(|difference| is_made(&difference.target));
+    Ok(Effect::Checked(found, present))
 }
 
 fn build_with_progress(engine: &Engine, args: &BakeArgs) -> anyhow::Result<Built> {
@@ -136,23 +143,17 @@ pub(crate) fn show_progress(bar: &ProgressBar) -> impl Fn(Progress) + Sync + '_ 
     }
 }
 
-/// The project's folder as the repository's root sees it, if the command was started there.
+/// The project's folder as seen from the root of its repository, as CI hosts name files.
 fn below_repository(dir: &Path) -> String {
-    let here = std::env::current_dir().ok();
-    let folder = dir.canonicalize().ok();
-    let below = here.zip(folder).and_then(|(here, folder)| Some(folder.strip_prefix(here).ok()?.to_owned()));
+    let Ok(folder) = dir.canonicalize() else { return String::new() };
+    let root = folder.ancestors().find(|ancestor| ancestor.join(".git").exists());
+    let below = root.and_then(|root| folder.strip_prefix(root).ok());
     below.map_or_else(String::new, |below| below.to_string_lossy().replace('\\', "/"))
 }
 
 /// Looks the cache over now and then; a bake never fails over it.
 fn collect_if_due(store: &Store, bytes_max: u64) {
-    let is_due = store.since_collection().is_none_or(|since| since > COLLECTION_INTERVAL)
-        || store.written_bytes() > bytes_max / 16;
-    if store.written_bytes() == 0 || store.is_read_only() || !is_due {
-        return;
-    }
-    let options = CollectOptions { bytes_max, wait: false, dry_run: false };
-    match store.collect(&options) {
+    match store.collect_if_due(bytes_max) {
         Ok(Some(collected)) if collected.removed_files > 0 => eprintln!(
             "note: the cache was over {}: {} went, unused for longest (`kiln gc --help`)",
             report::size(bytes_max),
@@ -252,13 +253,21 @@ impl Report {
             Effect::Written(written) => {
                 format!("{} written to {output_dir}", report::count(written.written.len(), "file"))
             }
+            Effect::Checked(differences, _)
+                if differences.is_empty() && has_errors(&self.built.diagnostics) =>
+            {
+                "the rest is as the manifest says".to_owned()
+            }
             Effect::Checked(differences, manifest) if differences.is_empty() => {
                 format!("the manifest is as it must be, {} in its files", report::size(manifest.bytes()))
             }
-            Effect::Checked(differences, _) => format!(
-                "{} would change: bake and commit {output_dir}/{MANIFEST_FILE}",
-                report::count(differences.len(), "target")
-            ),
+            Effect::Checked(differences, _) => {
+                let count = report::count(differences.len(), "target");
+                match has_errors(&self.built.diagnostics) {
+                    true => format!("{count} would change"),
+                    false => format!("{count} would change: bake and commit {output_dir}/{MANIFEST_FILE}"),
+                }
+            }
         }
     }
 
@@ -273,8 +282,9 @@ impl Report {
         };
         let case = |spec: &kiln_project::TargetSpec| {
             let actions = spec.parts.iter().map(kiln_project::PartSpec::action);
-            let ran = actions.filter(|action| self.built.report.ended.contains(action));
-            let records = ran.filter_map(|action| self.built.report.outcome(action).record.as_ref());
+            let outcomes = actions.map(|action| self.built.report.outcome(action));
+            let ran = outcomes.filter(|outcome| matches!(outcome.status, Status::Ran { .. }));
+            let records = ran.filter_map(|outcome| outcome.record.as_ref());
             let trouble =
                 self.built.trouble_of(spec).map(|said| said.iter().map(Diagnostic::to_string).collect());
             let complaint = complaints.get(spec.name.as_str()).map(|complaint| vec![complaint.to_string()]);

@@ -80,6 +80,7 @@ impl Demo {
             cache: place::cache_folder()?,
             jobs: place::jobs(None),
             memory_bytes: place::memory_bytes(None),
+            cache_bytes_max: place::cache_bytes_max()?,
             write_outputs: true,
         };
         let daemon = Daemon::start(&options).context("starting the daemon")?;

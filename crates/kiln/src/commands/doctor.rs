@@ -122,7 +122,7 @@ fn judge(findings: &mut Findings) {
     }
     if cache.damaged > 0 {
         problems.push(format!(
-            "{} were damaged and have been dropped; the next bake makes them anew. If this happens again, suspect the disk",
+            "{} found damaged and dropped; the next bake makes what is needed anew. If this happens again, suspect the disk",
             report::count(cache.damaged, "cached file")
         ));
     }

@@ -14,7 +14,7 @@ pub(crate) fn run(args: &GraphArgs) -> anyhow::Result<ExitCode> {
     let engine = place::open_engine(&args.dir)?;
     let _hold = engine.store().hold();
     let plan = kiln_project::plan(&engine, None).context("planning")?;
-    let forecasts = engine.forecast(&plan.graph).context("planning")?;
+    let forecasts = engine.forecast(&plan.graph);
     let wanted = match &args.target {
         None => plan.graph.iter().map(|(id, _)| id).collect(),
         Some(target) => match plan.actions_of(target) {

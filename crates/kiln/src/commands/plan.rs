@@ -17,7 +17,7 @@ pub(crate) fn run(args: &ReadArgs) -> anyhow::Result<ExitCode> {
     let engine = place::open_engine(&args.dir)?;
     let _hold = engine.store().hold();
     let plan = kiln_project::plan(&engine, None).context("planning")?;
-    let forecasts = engine.forecast(&plan.graph).context("planning")?;
+    let forecasts = engine.forecast(&plan.graph);
     // What was hashed for this need not be hashed again.
     engine.save_memory().context("remembering the sources")?;
     let plan_ms = start.elapsed().as_secs_f64() * 1e3;
@@ -27,7 +27,8 @@ pub(crate) fn run(args: &ReadArgs) -> anyhow::Result<ExitCode> {
         let (files, bytes) = engine.sources().hashed();
         let sources =
             json!({"looked_at": engine.sources().looked_at().len(), "hashed": files, "hashed_bytes": bytes});
-        let plan = json!({"actions": actions, "diagnostics": plan.diagnostics, "plan_ms": plan_ms, "sources": sources});
+        let targets: Vec<_> = plan.targets.iter().map(|target| &target.name).collect();
+        let plan = json!({"actions": actions, "targets": targets, "diagnostics": plan.diagnostics, "plan_ms": plan_ms, "sources": sources});
         say!("{plan:#}");
     } else {
         let mut expected_ms = 0.0;

@@ -34,6 +34,10 @@ pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
             targets.sort();
         }
     }
+    if targets.is_empty() {
+        say!("this project makes nothing, so there is nothing to verify");
+        return Ok(ExitCode::SUCCESS);
+    }
     let bar = progress_bar();
     let progress = show_progress(&bar);
     let cancel = AtomicBool::new(false);
@@ -47,7 +51,7 @@ pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
     let verified = verify(&engine, &targets, &options);
     bar.finish_and_clear();
     let verified = match verified {
-        Err(error @ VerifyError::OutOfDate(_)) => {
+        Err(error @ (VerifyError::OutOfDate(_) | VerifyError::AtFault(_))) => {
             eprintln!("error: {error}");
             return Ok(ExitCode::from(INPUT_IS_WRONG));
         }
@@ -57,8 +61,9 @@ pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
         say!("{:#}", serde_json::to_value(&verified)?);
     } else {
         for mismatch in &verified.mismatches {
-            let short =
-                |digest: Option<Digest>| digest.map_or_else(|| "nothing".to_owned(), |digest| digest.short());
+            let short = |digest: Option<Digest>| {
+                digest.map_or_else(|| "damaged or not made".to_owned(), |digest| digest.short())
+            };
             say!(
                 "{} of `{}` is {} in the store and {} when it is made afresh",
                 mismatch.output,

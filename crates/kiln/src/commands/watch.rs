@@ -19,6 +19,7 @@ pub(crate) fn run(args: &WatchArgs) -> anyhow::Result<ExitCode> {
         cache: place::cache_folder()?,
         jobs: place::jobs(args.build.jobs),
         memory_bytes: place::memory_bytes(args.build.memory),
+        cache_bytes_max: place::cache_bytes_max()?,
         write_outputs: !args.no_output,
     };
     let daemon = match Daemon::start(&options) {

@@ -21,7 +21,7 @@ pub(crate) fn run(args: &WhyArgs) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     };
     let plan = kiln_project::plan(&engine, None).context("planning")?;
-    let Some(actions) = kiln_project::why(&engine, &plan, target).context("looking the target up")? else {
+    let Some(actions) = kiln_project::why(&engine, &plan, target) else {
         eprintln!("error: there is no target `{target}`{}", suggestion(target, &plan));
         return Ok(ExitCode::from(INPUT_IS_WRONG));
     };
@@ -66,6 +66,7 @@ fn print_summary(engine: &Engine, target: &str, actions: &[ActionWhy], builds: &
     let built = actions.iter().filter_map(|action| action.change.as_ref()).map(|change| change.build).max();
     let last = kiln_project::last_build(engine);
     let state = match (out_of_date, built) {
+        (_, None) if actions.is_empty() => "follows from kiln.toml alone".to_owned(),
         (_, None) => "was never built".to_owned(),
         (0, Some(build)) => match last.filter(|last| last.number > build) {
             Some(last) => {
@@ -131,6 +132,6 @@ pub(crate) fn suggestion(wanted: &str, plan: &Plan) -> String {
     let names = plan.targets.iter().map(|target| target.name.as_str()).chain(actions);
     match kiln_project::suggest(wanted, names) {
         Some(help) => format!("\n  help: {help}"),
-        None => "\n  help: `kiln bake --json` lists the targets".to_owned(),
+        None => "\n  help: `kiln plan --json` lists the targets".to_owned(),
     }
 }
