@@ -1,13 +1,21 @@
 //! Names of contents.
 
 use std::fmt;
+use std::io::Read as _;
 use std::str::FromStr;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use sha2::{Digest as _, Sha256};
 
 /// A file is hashed in pieces of this size, so that its length costs no memory.
-const HASH_CHUNK_BYTES: usize = 256 << 10;
+const HASH_PIECE_BYTES: usize = 1 << 20;
+
+/// The next piece: whole, unless the end comes first.
+fn read_piece(reader: &mut impl std::io::Read) -> std::io::Result<Vec<u8>> {
+    let mut piece = Vec::new();
+    reader.take(HASH_PIECE_BYTES as u64).read_to_end(&mut piece)?;
+    Ok(piece)
+}
 
 /// SHA-256 of some bytes; written as 64 lower-case hexadecimal digits.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -19,21 +27,30 @@ impl Digest {
         Digest(Sha256::digest(bytes).into())
     }
 
-    /// The digest of everything a reader gives.
+    /// The digest of everything a reader gives. While one piece is hashed the next is read.
     ///
     /// # Errors
     /// Reading fails.
-    pub fn of_reader(reader: &mut impl std::io::Read) -> std::io::Result<Digest> {
-        let mut hasher = Sha256::new();
-        let mut chunk = vec![0; HASH_CHUNK_BYTES];
-        loop {
-            match reader.read(&mut chunk) {
-                Ok(0) => return Ok(Digest(hasher.finalize().into())),
-                Ok(count) => hasher.update(&chunk[..count]),
-                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
-                Err(error) => return Err(error),
-            }
+    pub fn of_reader(reader: &mut (impl std::io::Read + Send)) -> std::io::Result<Digest> {
+        let first = read_piece(reader)?;
+        if first.len() < HASH_PIECE_BYTES {
+            return Ok(Digest::of(&first));
         }
+        std::thread::scope(|scope| {
+            let (pieces, received) = std::sync::mpsc::sync_channel(2);
+            let reading = scope.spawn(move || {
+                let mut piece = first;
+                // The other side takes all pieces unless it panics.
+                while !piece.is_empty() && pieces.send(piece).is_ok() {
+                    piece = read_piece(reader)?;
+                }
+                Ok(())
+            });
+            let mut hasher = Sha256::new();
+            received.iter().for_each(|piece: Vec<u8>| hasher.update(&piece));
+            reading.join().unwrap_or_else(|_| Err(std::io::Error::other("reading panicked")))?;
+            Ok(Digest(hasher.finalize().into()))
+        })
     }
 
     /// The first eight digits, for people.

@@ -57,7 +57,10 @@ pub(crate) struct Stamp {
 pub struct SourceTree {
     root: PathBuf,
     stamps: Mutex<BTreeMap<String, Stamp>>,
-    seen: Mutex<HashMap<String, Seen>>,
+    /// `None`: to be looked at again.
+    seen: Mutex<HashMap<String, Option<Seen>>>,
+    /// Counts the changes to the set of paths in `seen`.
+    names_version: AtomicU64,
     hashed_files: AtomicUsize,
     hashed_bytes: AtomicU64,
 }
@@ -76,6 +79,7 @@ impl SourceTree {
             root,
             stamps: Mutex::new(stamps),
             seen: Mutex::default(),
+            names_version: AtomicU64::new(0),
             hashed_files: AtomicUsize::new(0),
             hashed_bytes: AtomicU64::new(0),
         }
@@ -89,14 +93,22 @@ impl SourceTree {
     /// Forgets what was seen, so that the next look is at the files as they are now.
     pub fn refresh(&self) {
         lock(&self.seen).clear();
+        self.names_version.fetch_add(1, Ordering::Relaxed);
     }
 
     /// Forgets what was seen at some paths: whoever is told of every change need not look at the other files again.
     pub fn forget<'a>(&self, paths: impl IntoIterator<Item = &'a String>) {
         let mut seen = lock(&self.seen);
         for path in paths {
-            seen.remove(path);
+            if let Some(seen) = seen.get_mut(path) {
+                *seen = None;
+            }
         }
+    }
+
+    /// Changes when a path is looked at for the first time since the last refresh, and with each refresh.
+    pub fn names_version(&self) -> u64 {
+        self.names_version.load(Ordering::Relaxed)
     }
 
     /// What is at `path` (project-relative) now, or was when it was first looked at since the last refresh.
@@ -111,18 +123,20 @@ impl SourceTree {
 
     /// Whether the content at `path` is still, or again, the one with this digest.
     pub(crate) fn is(&self, path: &str, digest: Option<Digest>) -> bool {
-        if let Some(seen) = lock(&self.seen).get(path) {
+        if let Some(Some(seen)) = lock(&self.seen).get(path) {
             return seen.state.digest() == digest;
         }
         self.state(path).digest() == digest
     }
 
     fn look(&self, path: &str) -> Seen {
-        if let Some(seen) = lock(&self.seen).get(path) {
+        if let Some(Some(seen)) = lock(&self.seen).get(path) {
             return seen.clone();
         }
         let seen = self.examine(path);
-        lock(&self.seen).insert(path.to_owned(), seen.clone());
+        if lock(&self.seen).insert(path.to_owned(), Some(seen.clone())).is_none() {
+            self.names_version.fetch_add(1, Ordering::Relaxed);
+        }
         seen
     }
 
@@ -134,16 +148,22 @@ impl SourceTree {
 
     /// Every path looked at since the last refresh, missing ones too: what a watcher must watch.
     pub fn looked_at(&self) -> Vec<String> {
-        let mut paths: Vec<String> = lock(&self.seen).keys().cloned().collect();
+        let seen = lock(&self.seen);
+        let looked_at = seen.iter().filter(|(_, seen)| seen.is_some());
+        let mut paths: Vec<String> = looked_at.map(|(path, _)| path.clone()).collect();
         paths.sort_unstable();
         paths
     }
 
-    /// Those of `paths` that are no longer as they were when they were looked at.
-    pub fn changed_since_seen<'a>(&self, paths: impl IntoIterator<Item = &'a String>) -> Vec<String> {
-        let seen = |path: &String| lock(&self.seen).get(path).cloned();
+    /// Those of `paths` that are no longer as they were when they were looked at. Ends early when `goes_on` says no.
+    pub fn changed_since_seen<'a>(
+        &self,
+        paths: impl IntoIterator<Item = &'a String>,
+        goes_on: impl Fn() -> bool,
+    ) -> Vec<String> {
+        let seen = |path: &String| lock(&self.seen).get(path).cloned().flatten();
         let is_changed = |path: &&String| seen(path).is_some_and(|seen| self.examine(path) != seen);
-        paths.into_iter().filter(is_changed).cloned().collect()
+        paths.into_iter().take_while(|_| goes_on()).filter(is_changed).cloned().collect()
     }
 
     /// How many files were read to learn their digest, and how many bytes they had together.
@@ -161,7 +181,7 @@ impl SourceTree {
         let seen = lock(&self.seen);
         lock(&self.stamps)
             .iter()
-            .filter(|(path, _)| seen.contains_key(*path))
+            .filter(|(path, _)| seen.get(*path).is_some_and(Option::is_some))
             .map(|(path, stamp)| (path.clone(), stamp.clone()))
             .collect()
     }

@@ -18,6 +18,8 @@ pub(crate) enum BuildResult {
     Cancelled(Batch),
     /// The tool could not do its work; what was published stays.
     Failed(Error),
+    /// These files are not what the last build saw, and nobody told.
+    Overlooked(Vec<String>),
     /// The build is done and published, but its files or the memory of it could not be written.
     OutputsFailed(Error),
 }
@@ -25,6 +27,8 @@ pub(crate) enum BuildResult {
 pub(crate) struct Builder {
     requests: Option<Sender<Batch>>,
     cancel: Arc<AtomicBool>,
+    /// Requests that the thread has not taken yet.
+    waiting: Arc<AtomicUsize>,
     thread: Option<std::thread::JoinHandle<()>>,
 }
 
@@ -57,14 +61,17 @@ impl Builder {
     ) -> Builder {
         let (requests, received) = channel();
         let cancel = Arc::new(AtomicBool::new(false));
-        let work = BuilderThread { engine, server, options, cancel: cancel.clone() };
+        let waiting = Arc::new(AtomicUsize::new(0));
+        let work =
+            BuilderThread { engine, server, options, cancel: cancel.clone(), waiting: waiting.clone() };
         let thread = std::thread::spawn(move || work.run(&received, &built));
-        Builder { requests: Some(requests), cancel, thread: Some(thread) }
+        Builder { requests: Some(requests), cancel, waiting, thread: Some(thread) }
     }
 
     pub(crate) fn request(&self, batch: Batch) {
         self.cancel.store(false, Ordering::SeqCst);
         if let Some(requests) = &self.requests {
+            self.waiting.fetch_add(1, Ordering::SeqCst);
             // The thread lives as long as the builder does.
             let _ = requests.send(batch);
         }
@@ -80,6 +87,7 @@ struct BuilderThread {
     server: Arc<Server>,
     options: BuilderOptions,
     cancel: Arc<AtomicBool>,
+    waiting: Arc<AtomicUsize>,
 }
 
 impl BuilderThread {
@@ -87,6 +95,7 @@ impl BuilderThread {
         // The watcher tells what changes from here on; before it, anything may have.
         let mut knows_all = false;
         while let Ok(batch) = requests.recv() {
+            self.waiting.fetch_sub(1, Ordering::SeqCst);
             let changed: Option<Vec<String>> =
                 (knows_all && !batch.files.is_empty()).then(|| batch.files.iter().cloned().collect());
             // No collection may take what a build counts on.
@@ -116,6 +125,18 @@ impl BuilderThread {
             drop(hold);
             // What cannot be collected now can be later.
             let _ = self.engine.store().collect_if_due(self.options.cache_bytes_max);
+            self.look_for_overlooked(built);
+        }
+    }
+
+    /// A file system may not tell of every change (a network's, a link that leads elsewhere now): while there is nothing
+    /// else to do all files are looked at, by `stat` alone.
+    fn look_for_overlooked(&self, built: &impl Fn(BuildResult)) {
+        let is_idle = || self.waiting.load(Ordering::SeqCst) == 0 && !self.cancel.load(Ordering::SeqCst);
+        let sources = self.engine.sources();
+        let changed = sources.changed_since_seen(&sources.looked_at(), is_idle);
+        if !changed.is_empty() {
+            built(BuildResult::Overlooked(changed));
         }
     }
 

@@ -1,5 +1,6 @@
 //! The loop.
 
+use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -109,6 +110,8 @@ pub struct Daemon {
     is_incomplete: bool,
     /// Sources that are watched.
     relevant: Vec<String>,
+    /// [`kiln_build::SourceTree::names_version`] of them.
+    relevant_version: u64,
     _lock: ProjectLock,
 }
 
@@ -160,6 +163,7 @@ impl Daemon {
             building: None,
             is_incomplete: false,
             relevant: Vec::new(),
+            relevant_version: 0,
             _lock: lock,
         };
         daemon.begin_build(Batch::default());
@@ -189,17 +193,21 @@ impl Daemon {
                         self.begin_build(Batch::default());
                     }
                 }
-                Event::Files(batch) => match &mut self.building {
-                    Some(unseen) => {
-                        unseen.merge(batch);
-                        self.builder.cancel();
-                    }
-                    None => {
-                        notify(Notice::Building { files: batch.files.iter().cloned().collect() });
-                        self.begin_build(batch);
-                    }
-                },
+                Event::Files(batch) => self.take_files(batch, notify),
                 Event::Built(result) => self.end_build(result, notify),
+            }
+        }
+    }
+
+    fn take_files(&mut self, batch: Batch, notify: &mut dyn FnMut(Notice)) {
+        match &mut self.building {
+            Some(unseen) => {
+                unseen.merge(batch);
+                self.builder.cancel();
+            }
+            None => {
+                notify(Notice::Building { files: batch.files.iter().cloned().collect() });
+                self.begin_build(batch);
             }
         }
     }
@@ -221,6 +229,7 @@ impl Daemon {
                 return;
             }
             BuildResult::OutputsFailed(error) => return notify(Notice::Failed(error.to_string())),
+            BuildResult::Overlooked(files) => return self.take_files(Batch::now(files.clone()), notify),
             BuildResult::Cancelled(batch) => batch.clone(),
             BuildResult::Done(_) | BuildResult::Failed(_) => Batch::default(),
         };
@@ -228,21 +237,25 @@ impl Daemon {
         match result {
             BuildResult::Done(table) => self.publish(*table, notify),
             BuildResult::Failed(error) => notify(Notice::Failed(error.to_string())),
-            BuildResult::Cancelled(_) | BuildResult::OutputsFailed(_) => {}
+            BuildResult::Cancelled(_) | BuildResult::OutputsFailed(_) | BuildResult::Overlooked(_) => {}
         }
-        // Sources that became relevant with this build may have changed before they were watched.
+        // Sources that became relevant with this build may have changed before they were watched, and a link may lead
+        // elsewhere now.
         let sources = self.engine.sources();
-        let mut relevant = sources.looked_at();
-        relevant.push(kiln_project::PROJECT_FILE.to_owned());
-        if is_failure {
-            // A plan that broke off has not looked at everything that matters.
-            relevant.extend(std::mem::take(&mut self.relevant));
+        if self.relevant_version != sources.names_version() || is_failure || self.watch.has_links() {
+            self.relevant_version = sources.names_version();
+            let mut relevant = sources.looked_at();
+            relevant.push(kiln_project::PROJECT_FILE.to_owned());
+            if is_failure {
+                // A plan that broke off has not looked at everything that matters.
+                relevant.extend(std::mem::take(&mut self.relevant));
+            }
+            self.watch.set_relevant(&relevant);
+            let old: HashSet<&String> = self.relevant.iter().collect();
+            let new = relevant.iter().filter(|path| !old.contains(path));
+            unseen.merge(Batch::now(sources.changed_since_seen(new, || true)));
+            self.relevant = relevant;
         }
-        // A link may lead elsewhere now, and a file system may not tell of every change: after each build all files are
-        // looked at, by `stat` alone.
-        self.watch.set_relevant(&relevant);
-        unseen.merge(Batch::now(sources.changed_since_seen(&relevant)));
-        self.relevant = relevant;
         if !unseen.files.is_empty() {
             notify(Notice::Building { files: unseen.files.iter().cloned().collect() });
             self.begin_build(unseen);

@@ -48,6 +48,8 @@ pub(crate) struct Watch {
     /// What the last plan looked at.
     relevant: Arc<Mutex<Relevant>>,
     outside: BTreeSet<PathBuf>,
+    /// Whether a source is a link, or lies outside the folder.
+    has_links: bool,
 }
 
 impl Watch {
@@ -64,7 +66,12 @@ impl Watch {
         std::thread::spawn(move || {
             settle(&events, &settled, |event| name_changes(event, &folder_of_thread, &relevant_of_thread));
         });
-        Ok(Watch { watcher, folder: folder.to_owned(), relevant, outside: BTreeSet::new() })
+        Ok(Watch { watcher, folder: folder.to_owned(), relevant, outside: BTreeSet::new(), has_links: false })
+    }
+
+    /// Whether [`Watch::set_relevant`] depends on more than the sources' names.
+    pub(crate) fn has_links(&self) -> bool {
+        self.has_links
     }
 
     /// Says which sources matter (project-relative, missing ones too). Those that lie outside the folder, or are
@@ -73,9 +80,11 @@ impl Watch {
         let mut relevant = Relevant::new();
         let mut outside = BTreeSet::new();
         let mut folders = HashMap::new();
+        self.has_links = false;
         for name in names {
             let path = normalise(&self.folder.join(name));
             let target = follow_links(&path, &mut folders);
+            self.has_links |= target != path || !path.starts_with(&self.folder);
             for path in [path, target] {
                 if !path.starts_with(&self.folder)
                     && let Some(parent) = path.parent()

@@ -333,6 +333,22 @@ fn source_changed_between_plan_and_run_is_refused() {
 }
 
 #[test]
+fn file_hashed_in_pieces_has_the_digest_of_its_bytes() {
+    for length in [0, 1, (1 << 20) - 1, 1 << 20, (1 << 20) + 1, (5 << 20) + 77] {
+        let bytes: Vec<u8> = (0..length).map(|index: usize| (index * 31 % 251) as u8).collect();
+        assert_eq!(Digest::of_reader(&mut &bytes[..]).unwrap(), Digest::of(&bytes), "{length}");
+    }
+    struct Broken(usize);
+    impl std::io::Read for Broken {
+        fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+            self.0 += buffer.len();
+            if self.0 > 3 << 20 { Err(std::io::Error::other("gone")) } else { Ok(buffer.len()) }
+        }
+    }
+    assert!(Digest::of_reader(&mut Broken(0)).is_err());
+}
+
+#[test]
 fn digest_text_round_trips_and_other_text_is_refused() {
     let digest = Digest::of(b"kiln");
     assert_eq!(digest.to_string().parse::<Digest>().unwrap(), digest);
