@@ -77,6 +77,12 @@ fn bake_after_each_kind_of_edit_runs_only_what_it_affects() {
         "\"version\": \"2.0\", \"copyright\": \"me\"",
     );
     assert_eq!(scene, ["pack scene/balls"]);
+    // Another picture under the same name: the effects stay, so no shader is compiled.
+    let other =
+        std::fs::read(project.path("scenes/textures/tiles_occlusion_roughness_metallic.png")).unwrap();
+    project.write("scenes/textures/tiles_base_color.png", other);
+    let (_, report) = project.bake();
+    assert_eq!(actions_with(&report, "ran"), ["pack scene/balls"]);
 }
 
 #[test]

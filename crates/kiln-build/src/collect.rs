@@ -154,10 +154,13 @@ impl Store {
         }
         let mut collected = Collected::default();
         let projects = self.projects()?;
+        if !options.dry_run {
+            self.remove_memories_without_projects()?;
+        }
         for project in projects.iter().filter(|project| !project.usage.is_held) {
             collected.forgotten_projects.push(project.usage.folder.clone());
             if !options.dry_run {
-                self.remove_project(project);
+                self.remove_folder(&project.folder);
             }
         }
         let held = held_paths(&projects);
@@ -321,12 +324,26 @@ impl Store {
         Ok(projects)
     }
 
-    fn remove_project(&self, project: &FoundProject) {
-        for path in self.list(&project.folder).unwrap_or_default() {
+    /// Projects that were planned and never baked leave a memory alone.
+    fn remove_memories_without_projects(&self) -> Result<(), Error> {
+        for folder in self.list(&self.root().join(PROJECTS))? {
+            let files = self.list(&folder)?;
+            let last_use =
+                files.iter().filter_map(|path| age(self.file_system().facts(path).ok()?.modified)).min();
+            let is_published = files.iter().any(|path| path.ends_with(PUBLISHED_FILE));
+            if !is_published && last_use.is_none_or(|age| age > FOREIGN_PROJECT_AGE_MAX) {
+                self.remove_folder(&folder);
+            }
+        }
+        Ok(())
+    }
+
+    fn remove_folder(&self, folder: &Path) {
+        for path in self.list(folder).unwrap_or_default() {
             // What cannot be removed is tried again by the next collection.
             let _ = self.file_system().remove(&path);
         }
-        let _ = std::fs::remove_dir(&project.folder);
+        let _ = std::fs::remove_dir(folder);
     }
 }
 

@@ -195,11 +195,15 @@ impl Engine {
 
     /// Begins a plan. `changed` names the sources that may be different since the last plan; `None` stands for all.
     pub fn begin_plan(&self, changed: Option<&[String]>) {
+        let mut memory = lock(&self.memory);
         match changed {
             Some(paths) => self.sources.forget(paths),
-            None => self.sources.refresh(),
+            None => {
+                self.sources.refresh();
+                memory.actions.values_mut().for_each(|action| action.is_present = false);
+            }
         }
-        lock(&self.memory).scans.values_mut().for_each(|scan| scan.is_asked = false);
+        memory.scans.values_mut().for_each(|scan| scan.is_asked = false);
     }
 
     /// The builds that changed something, the newest last.

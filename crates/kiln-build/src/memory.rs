@@ -69,6 +69,9 @@ pub(crate) struct ActionMemory {
     pub(crate) key: Digest,
     pub(crate) record: Arc<ActionRecord>,
     pub(crate) change: ChangeNote,
+    /// Whether all it made was seen in the store since the last plan of everything.
+    #[serde(skip)]
+    pub(crate) is_present: bool,
 }
 
 /// Why an action's result is another one than before.
@@ -111,7 +114,10 @@ impl Memory {
         let reason = Reason::between(before.map(|before| &*before.record), record);
         let since = before.map(|before| before.change.build);
         let change = ChangeNote { build, since, reason, ran };
-        self.actions.insert(record.name.clone(), ActionMemory { key, record: record.clone(), change });
+        self.actions.insert(
+            record.name.clone(),
+            ActionMemory { key, record: record.clone(), change, is_present: ran },
+        );
         self.own.insert(record.name.clone());
         self.is_changed = true;
     }

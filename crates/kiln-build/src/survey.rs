@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::memory::ActionMemory;
 use crate::run::{Outcome, Status};
 use crate::{Action, ActionId, ActionRecord, ActionResult, Engine, Graph, Input, InputRecord, Reason};
 
@@ -103,7 +104,7 @@ impl Engine {
             let is_settled = |id: &ActionId| matches!(standings[id.0], Standing::Settled(_));
             let is_needed =
                 graph.wanted[index] || readers[index].is_empty() || !readers[index].iter().all(is_settled);
-            if !is_needed || self.store().has_outputs(record) {
+            if !is_needed || self.is_present(record) {
                 continue;
             }
             standings[index] =
@@ -115,6 +116,22 @@ impl Engine {
                 }
             }
         }
+    }
+
+    /// Whether all that an action made is in the store. Asked once while plans only hear of changes: what goes meanwhile is
+    /// found missing when it is read, and then everything is planned again.
+    fn is_present(&self, record: &Arc<ActionRecord>) -> bool {
+        let known = |memory: &ActionMemory| Arc::ptr_eq(&memory.record, record) && memory.is_present;
+        if self.memory().actions.get(&record.name).is_some_and(known) {
+            return true;
+        }
+        let is_present = self.store().has_outputs(record);
+        if let Some(memory) = self.memory().actions.get_mut(&record.name)
+            && Arc::ptr_eq(&memory.record, record)
+        {
+            memory.is_present = is_present;
+        }
+        is_present
     }
 
     /// The result for these inputs, if it is known; what it made may be gone from the store.

@@ -41,7 +41,17 @@ pub(crate) fn run() -> Result<(), String> {
         bench.growth(Size { environments: 0, scenes: 0, shaders, modules: 9 })?;
     }
     println!();
-    bench.overhead()
+    bench.overhead()?;
+    cancellation()
+}
+
+/// How long a build goes on when it is not wanted any more: measured by a test, which knows the inside.
+fn cancellation() -> Result<(), String> {
+    let mut test =
+        cargo(&["test", "--release", "--workspace", "cancelled_build_ends_soon", "--", "--nocapture"]);
+    let printed = output_of(&mut test)?;
+    printed.lines().filter(|line| line.contains("cancelled:")).for_each(|line| println!("{line}"));
+    Ok(())
 }
 
 impl Bench {

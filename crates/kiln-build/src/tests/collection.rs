@@ -106,6 +106,20 @@ fn project_whose_folder_is_gone_holds_nothing() {
 }
 
 #[test]
+fn memory_of_a_project_that_was_only_planned_goes_after_a_month() {
+    let place = Place::new();
+    place.write("a.txt", "kiln");
+    let engine = place.engine();
+    engine.source("a.txt");
+    engine.save_memory().unwrap();
+    collect(&place.store(), 0);
+    assert!(!place.files("v2/projects").is_empty(), "it is young");
+    place.files("v2/projects").iter().for_each(|path| make_old(path, 31 * 86_400));
+    collect(&place.store(), 0);
+    assert_eq!(fs::read_dir(place.cache.path().join("v2/projects")).unwrap().count(), 0);
+}
+
+#[test]
 fn collection_leaves_a_running_build_alone() {
     let place = Place::new();
     place.write("a.txt", "kiln");
