@@ -87,8 +87,8 @@ impl Engine {
         let project = Digest::of(folder.as_os_str().as_encoded_bytes());
         let mut memory: Memory = store.project_document(&project, MEMORY_FILE).unwrap_or_default();
         memory.read_build = memory.next_build() - 1;
-        let sources = SourceTree::new(folder.clone(), std::mem::take(&mut memory.source_stamps));
-        let outputs = SourceTree::new(folder.clone(), std::mem::take(&mut memory.output_stamps));
+        let sources = SourceTree::new(folder.clone(), memory.source_stamps.clone());
+        let outputs = SourceTree::new(folder.clone(), memory.output_stamps.clone());
         let memory = Mutex::new(memory);
         Ok(Engine { store, sources, outputs, memory, published: Mutex::default(), folder, project })
     }

@@ -5,13 +5,11 @@ use std::process::{Command, Stdio};
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant, SystemTime};
 
-use crate::bench::{Bench, Running, lines_of, print_times};
+use crate::bench::{Bench, Running, SETTLING, lines_of, print_times};
 use crate::shell::{cargo, output_of, step};
 
 const RUNS: usize = 20;
 const EDITS: usize = 20;
-/// A file that is younger than this may be hashed again.
-const RACY: Duration = Duration::from_secs(3);
 
 /// How large a generated project is.
 #[derive(Clone, Copy)]
@@ -105,7 +103,7 @@ impl Bench {
     /// Bakes until no file is young any more.
     fn settle(&self, project: &Path, cache: &str) -> Result<(), String> {
         let start = Instant::now();
-        while start.elapsed() < RACY {
+        while start.elapsed() < SETTLING {
             output_of(self.kiln(cache).arg("bake").arg(project))?;
         }
         output_of(self.kiln(cache).arg("bake").arg(project))?;
