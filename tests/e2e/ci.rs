@@ -155,6 +155,10 @@ fn why_names_old_and_new_value_and_what_was_left_alone() {
     assert!(said.contains("after the result of build 1"), "{said}");
     let (_, said) = why("env/sky/specular");
     assert!(said.contains("build 2 had no reason to touch it"), "{said}");
+    project.edit("shaders/pbr/tonemap.wgsl", "vec3f(1.0, 1.0, 1.0)", "vec3f(1.0, half, 1.0)");
+    project.bake();
+    let (_, said) = why("shader/tonemap/base");
+    assert!(said.contains("cannot be made from its present sources"), "{said}");
     let (code, said) = why("env/sky/specula");
     assert_eq!(code, 1);
     assert!(said.contains("did you mean `env/sky/specular`?"), "{said}");

@@ -14,6 +14,8 @@ pub struct ActionWhy {
     pub now: String,
     /// Whether a build would, or might, run it now.
     pub is_out_of_date: bool,
+    /// Whether it makes nothing, because its input, or that of an action before it, is at fault.
+    pub is_at_fault: bool,
     /// What was different when it last got another result; `None` if it was never built.
     pub change: Option<ChangeNote>,
     /// Actions before it that ran later and made the same again, so that it did not have to.
@@ -60,6 +62,7 @@ fn explain(engine: &Engine, graph: &Graph, id: ActionId, forecast: &Forecast) ->
         Forecast::Blocked { by } => format!("cannot run: `{by}` made nothing"),
     };
     let is_out_of_date = matches!(forecast, Forecast::Runs { .. } | Forecast::MayRun { .. });
+    let is_at_fault = matches!(forecast, Forecast::Failed | Forecast::Blocked { .. });
     let own_build = change.as_ref().map_or(0, |change| change.build);
     let cut_off_by = action.inputs.iter().filter_map(|input| {
         let Input::Output { action: upstream, output } = input else { return None };
@@ -73,7 +76,14 @@ fn explain(engine: &Engine, graph: &Graph, id: ActionId, forecast: &Forecast) ->
             digest: made.digest,
         })
     });
-    ActionWhy { action: action.name.clone(), now, is_out_of_date, change, cut_off_by: cut_off_by.collect() }
+    ActionWhy {
+        action: action.name.clone(),
+        now,
+        is_out_of_date,
+        is_at_fault,
+        change,
+        cut_off_by: cut_off_by.collect(),
+    }
 }
 
 /// A reason with old and new values.

@@ -68,6 +68,9 @@ fn print_summary(engine: &Engine, target: &str, actions: &[ActionWhy], builds: &
     let state = match (out_of_date, built) {
         (_, None) if actions.is_empty() => "follows from kiln.toml alone".to_owned(),
         (_, None) => "was never built".to_owned(),
+        (0, _) if actions.iter().any(|action| action.is_at_fault) => {
+            "cannot be made from its present sources: `kiln bake` says why; what was good last is still served".to_owned()
+        }
         (0, Some(build)) => match last.filter(|last| last.number > build) {
             Some(last) => {
                 format!("is up to date since build {build}; build {} had no reason to touch it", last.number)
