@@ -1,9 +1,12 @@
 //! Where things are on this machine.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context as _, bail};
-use kiln_build::{Engine, Store};
+use kiln_build::{Engine, Progress, RunOptions, Store};
+
+use crate::args::BuildArgs;
 
 /// The store: `KILN_CACHE`, or `kiln` in the user's cache folder.
 pub(crate) fn cache_folder() -> anyhow::Result<PathBuf> {
@@ -59,6 +62,22 @@ pub(crate) fn memory_bytes(asked: Option<u64>) -> u64 {
     /// Where the system does not tell.
     const USUAL: u64 = 4 << 30;
     asked.unwrap_or_else(|| free_memory_bytes().map_or(USUAL, |free| free / 4 * 3))
+}
+
+/// How to run actions, as the command line asks.
+pub(crate) fn run_options<'a>(
+    args: &BuildArgs,
+    keep_going: bool,
+    cancel: &'a AtomicBool,
+    progress: &'a (dyn Fn(Progress) + Sync),
+) -> RunOptions<'a> {
+    RunOptions {
+        jobs: jobs(args.jobs),
+        memory_bytes: memory_bytes(args.memory),
+        keep_going,
+        cancel,
+        progress,
+    }
 }
 
 /// Free memory, within the limit of this process's control group.

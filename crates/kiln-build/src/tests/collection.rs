@@ -8,7 +8,7 @@ fn collect(store: &Store, bytes_max: u64) -> Collected {
     store.collect(&CollectOptions { bytes_max, wait: true, dry_run: false }).unwrap().unwrap()
 }
 
-fn make_old(path: &std::path::Path, seconds: u64) {
+fn make_old(path: &Path, seconds: u64) {
     let file = fs::File::options().write(true).open(path).unwrap();
     file.set_modified(SystemTime::now() - Duration::from_secs(seconds)).unwrap();
 }
@@ -215,7 +215,7 @@ fn check_finds_and_drops_a_flipped_bit_in_every_kind_of_file() {
 /// A store as version 0.1 wrote it before the present format.
 const STORE_V1: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/store-v1");
 
-fn copy(from: &std::path::Path, to: &std::path::Path) {
+fn copy(from: &Path, to: &Path) {
     fs::create_dir_all(to).unwrap();
     for entry in fs::read_dir(from).unwrap() {
         let entry = entry.unwrap();
@@ -231,7 +231,7 @@ fn copy(from: &std::path::Path, to: &std::path::Path) {
 #[test]
 fn store_of_format_1_is_neither_used_nor_damaged_and_goes_when_it_is_old() {
     let place = Place::new();
-    copy(std::path::Path::new(STORE_V1), place.cache.path());
+    copy(Path::new(STORE_V1), place.cache.path());
     let count = place.files("v1").len();
     assert!(count >= 5, "the fixture has blobs, records, a scan and a project");
     place.write("a.txt", "kiln");

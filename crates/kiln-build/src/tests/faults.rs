@@ -3,8 +3,6 @@
 #![expect(clippy::print_stdout, reason = "what was injected is reported")]
 
 use std::collections::HashSet;
-use std::io;
-use std::path::Path;
 use std::sync::Mutex;
 
 use super::*;
@@ -283,52 +281,8 @@ fn power_failure_without_sync_is_seen_by_the_check() {
 fn cache_that_cannot_be_written_is_read_and_nothing_in_it_changes() {
     let place = edited_place();
     let before = place.files("v2");
-    #[derive(Debug)]
-    struct ReadOnly;
-    impl FileSystem for ReadOnly {
-        fn read(&self, path: &Path) -> io::Result<Vec<u8>> {
-            Disk.read(path)
-        }
-        fn facts(&self, path: &Path) -> io::Result<FileFacts> {
-            Disk.facts(path)
-        }
-        fn list(&self, folder: &Path) -> io::Result<Vec<PathBuf>> {
-            Disk.list(folder)
-        }
-        fn create_folder(&self, folder: &Path) -> io::Result<()> {
-            Disk.create_folder(folder)
-        }
-        fn write_new(&self, path: &Path, bytes: &[u8]) -> io::Result<()> {
-            if is_below_a_cache(path) {
-                Err(io::ErrorKind::ReadOnlyFilesystem.into())
-            } else {
-                Disk.write_new(path, bytes)
-            }
-        }
-        fn sync(&self, path: &Path) -> io::Result<()> {
-            Disk.sync(path)
-        }
-        fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-            Disk.rename(from, to)
-        }
-        fn sync_folder(&self, folder: &Path) -> io::Result<()> {
-            Disk.sync_folder(folder)
-        }
-        fn remove(&self, path: &Path) -> io::Result<()> {
-            if is_below_a_cache(path) {
-                Err(io::ErrorKind::ReadOnlyFilesystem.into())
-            } else {
-                Disk.remove(path)
-            }
-        }
-        fn touch(&self, _: &Path) -> io::Result<()> {
-            Err(io::ErrorKind::ReadOnlyFilesystem.into())
-        }
-    }
-    fn is_below_a_cache(path: &Path) -> bool {
-        path.components().any(|part| part.as_os_str() == "v2")
-    }
-    let store = Store::open_on(Arc::new(ReadOnly), place.cache.path()).unwrap();
+    let read_only = Denying(|_, path| path.components().any(|part| part.as_os_str() == "v2"));
+    let store = Store::open_on(Arc::new(read_only), place.cache.path()).unwrap();
     assert!(store.is_read_only());
     let engine = Engine::open(place.folder.path(), store).unwrap();
     let ran_actions = ran(&run(&engine, &two_steps(&engine), 1));

@@ -1,5 +1,6 @@
 use std::fs;
-use std::path::PathBuf;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -12,6 +13,69 @@ mod collection;
 mod faults;
 mod scheduling;
 mod sources;
+
+/// What may be denied to a store.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Operation {
+    Write,
+    Remove,
+    Touch,
+}
+
+/// A disk on which some files may not be written, removed or touched.
+#[derive(Debug)]
+struct Denying(fn(Operation, &Path) -> bool);
+
+impl Denying {
+    fn ask(&self, operation: Operation, path: &Path) -> io::Result<()> {
+        if (self.0)(operation, path) { Err(io::ErrorKind::PermissionDenied.into()) } else { Ok(()) }
+    }
+}
+
+impl FileSystem for Denying {
+    fn read(&self, path: &Path) -> io::Result<Vec<u8>> {
+        Disk.read(path)
+    }
+
+    fn facts(&self, path: &Path) -> io::Result<FileFacts> {
+        Disk.facts(path)
+    }
+
+    fn list(&self, folder: &Path) -> io::Result<Vec<PathBuf>> {
+        Disk.list(folder)
+    }
+
+    fn create_folder(&self, folder: &Path) -> io::Result<()> {
+        Disk.create_folder(folder)
+    }
+
+    fn write_new(&self, path: &Path, bytes: &[u8]) -> io::Result<()> {
+        self.ask(Operation::Write, path)?;
+        Disk.write_new(path, bytes)
+    }
+
+    fn sync(&self, path: &Path) -> io::Result<()> {
+        Disk.sync(path)
+    }
+
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        Disk.rename(from, to)
+    }
+
+    fn sync_folder(&self, folder: &Path) -> io::Result<()> {
+        Disk.sync_folder(folder)
+    }
+
+    fn remove(&self, path: &Path) -> io::Result<()> {
+        self.ask(Operation::Remove, path)?;
+        Disk.remove(path)
+    }
+
+    fn touch(&self, path: &Path) -> io::Result<()> {
+        self.ask(Operation::Touch, path)?;
+        Disk.touch(path)
+    }
+}
 
 /// A project folder and a cache that go away.
 struct Place {
@@ -339,10 +403,10 @@ fn file_hashed_in_pieces_has_the_digest_of_its_bytes() {
         assert_eq!(Digest::of_reader(&mut &bytes[..]).unwrap(), Digest::of(&bytes), "{length}");
     }
     struct Broken(usize);
-    impl std::io::Read for Broken {
-        fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+    impl io::Read for Broken {
+        fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
             self.0 += buffer.len();
-            if self.0 > 3 << 20 { Err(std::io::Error::other("gone")) } else { Ok(buffer.len()) }
+            if self.0 > 3 << 20 { Err(io::Error::other("gone")) } else { Ok(buffer.len()) }
         }
     }
     assert!(Digest::of_reader(&mut Broken(0)).is_err());
@@ -515,41 +579,6 @@ fn builds_of_two_processes_are_both_remembered() {
 
 #[test]
 fn damaged_file_that_cannot_be_removed_is_replaced() {
-    #[derive(Debug)]
-    struct NoRemoval;
-    impl FileSystem for NoRemoval {
-        fn read(&self, path: &std::path::Path) -> std::io::Result<Vec<u8>> {
-            Disk.read(path)
-        }
-        fn facts(&self, path: &std::path::Path) -> std::io::Result<FileFacts> {
-            Disk.facts(path)
-        }
-        fn list(&self, folder: &std::path::Path) -> std::io::Result<Vec<PathBuf>> {
-            Disk.list(folder)
-        }
-        fn create_folder(&self, folder: &std::path::Path) -> std::io::Result<()> {
-            Disk.create_folder(folder)
-        }
-        fn write_new(&self, path: &std::path::Path, bytes: &[u8]) -> std::io::Result<()> {
-            Disk.write_new(path, bytes)
-        }
-        fn sync(&self, path: &std::path::Path) -> std::io::Result<()> {
-            Disk.sync(path)
-        }
-        fn rename(&self, from: &std::path::Path, to: &std::path::Path) -> std::io::Result<()> {
-            Disk.rename(from, to)
-        }
-        fn sync_folder(&self, folder: &std::path::Path) -> std::io::Result<()> {
-            Disk.sync_folder(folder)
-        }
-        fn remove(&self, path: &std::path::Path) -> std::io::Result<()> {
-            let is_probe = path.parent().is_some_and(|folder| folder.ends_with("v2"));
-            if is_probe { Disk.remove(path) } else { Err(std::io::ErrorKind::PermissionDenied.into()) }
-        }
-        fn touch(&self, path: &std::path::Path) -> std::io::Result<()> {
-            Disk.touch(path)
-        }
-    }
     let place = Place::new();
     place.write("a.txt", "kiln");
     place.run(1);
@@ -558,7 +587,11 @@ fn damaged_file_that_cannot_be_removed_is_replaced() {
         bytes[0] ^= 1;
         fs::write(&path, bytes).unwrap();
     }
-    let store = Store::open_on(Arc::new(NoRemoval), place.cache.path()).unwrap();
+    // Opening a store makes and removes a file beside its folders.
+    let denying = Denying(|operation, path| {
+        operation == Operation::Remove && path.parent().is_none_or(|folder| !folder.ends_with("v2"))
+    });
+    let store = Store::open_on(Arc::new(denying), place.cache.path()).unwrap();
     let engine = Engine::open(place.folder.path(), store).unwrap();
     let digest = Digest::of(b"KILN");
     assert_eq!(engine.store().get(&digest), None);

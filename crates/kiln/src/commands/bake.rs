@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
-use kiln_build::{Engine, Error, Progress, RunOptions, Status, Store};
+use kiln_build::{Engine, Error, Progress, Status, Store};
 use kiln_diagnostic::{Diagnostic, has_errors};
 use kiln_project::{
     Built, Difference, DifferenceKind, HEALING_TRIES_MAX, MANIFEST_FILE, Manifest, Written, build,
@@ -112,13 +112,7 @@ fn build_with_progress(engine: &Engine, args: &BakeArgs) -> anyhow::Result<Built
     let bar = progress_bar();
     let progress = show_progress(&bar);
     let cancel = AtomicBool::new(false);
-    let options = RunOptions {
-        jobs: place::jobs(args.build.jobs),
-        memory_bytes: place::memory_bytes(args.build.memory),
-        keep_going: args.keep_going,
-        cancel: &cancel,
-        progress: &progress,
-    };
+    let options = place::run_options(&args.build, args.keep_going, &cancel, &progress);
     let built = build(engine, None, &options);
     bar.finish_and_clear();
     built.context("building")?.context("the build was cancelled")

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::Context as _;
-use kiln_build::{Digest, RunOptions};
+use kiln_build::Digest;
 use kiln_project::{VerifyError, verify};
 
 use crate::args::VerifyArgs;
@@ -41,13 +41,7 @@ pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
     let bar = progress_bar();
     let progress = show_progress(&bar);
     let cancel = AtomicBool::new(false);
-    let options = RunOptions {
-        jobs: place::jobs(args.build.jobs),
-        memory_bytes: place::memory_bytes(args.build.memory),
-        keep_going: true,
-        cancel: &cancel,
-        progress: &progress,
-    };
+    let options = place::run_options(&args.build, true, &cancel, &progress);
     let verified = verify(&engine, &targets, &options);
     bar.finish_and_clear();
     let verified = match verified {
