@@ -3,12 +3,16 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::Duration;
 
 use kiln_build::{ActionId, Engine, Error, Outcome, RunOptions, Status};
 use kiln_link::{ActionTime, ProgressReport, RevisionTable, Server, Work};
 use kiln_project::{Built, build, write_outputs};
 
 use crate::watch::Batch;
+
+/// A watcher that works tells of a change within this time.
+const TOLD_WITHIN: Duration = Duration::from_millis(700);
 
 /// A finished build, as the loop sees it.
 pub(crate) enum BuildResult {
@@ -94,7 +98,8 @@ impl BuilderThread {
     fn run(&self, requests: &Receiver<Batch>, built: &impl Fn(BuildResult)) {
         // The watcher tells what changes from here on; before it, anything may have.
         let mut knows_all = false;
-        while let Ok(batch) = requests.recv() {
+        let mut next = None;
+        while let Some(batch) = next.take().or_else(|| requests.recv().ok()) {
             self.waiting.fetch_sub(1, Ordering::SeqCst);
             let changed: Option<Vec<String>> =
                 (knows_all && !batch.files.is_empty()).then(|| batch.files.iter().cloned().collect());
@@ -125,18 +130,26 @@ impl BuilderThread {
             drop(hold);
             // What cannot be collected now can be later.
             let _ = self.engine.store().collect_if_due(self.options.cache_bytes_max);
-            self.look_for_overlooked(built);
+            next = self.look_for_overlooked(requests, built);
         }
     }
 
     /// A file system may not tell of every change (a network's, a link that leads elsewhere now): while there is nothing
-    /// else to do all files are looked at, by `stat` alone.
-    fn look_for_overlooked(&self, built: &impl Fn(BuildResult)) {
+    /// else to do all files are looked at, by `stat` alone. A change that is told of a moment later is no such one: then
+    /// its request is returned.
+    fn look_for_overlooked(&self, requests: &Receiver<Batch>, built: &impl Fn(BuildResult)) -> Option<Batch> {
         let is_idle = || self.waiting.load(Ordering::SeqCst) == 0 && !self.cancel.load(Ordering::SeqCst);
         let sources = self.engine.sources();
         let changed = sources.changed_since_seen(&sources.looked_at(), is_idle);
-        if !changed.is_empty() {
-            built(BuildResult::Overlooked(changed));
+        if changed.is_empty() {
+            return None;
+        }
+        match requests.recv_timeout(TOLD_WITHIN) {
+            Ok(batch) => Some(batch),
+            Err(_) => {
+                built(BuildResult::Overlooked(changed));
+                None
+            }
         }
     }
 
