@@ -124,6 +124,15 @@ impl Place {
         files
     }
 
+    /// Flips a bit in every blob.
+    fn damage_blobs(&self) {
+        for path in self.blobs() {
+            let mut bytes = fs::read(&path).unwrap();
+            bytes[0] ^= 1;
+            fs::write(&path, bytes).unwrap();
+        }
+    }
+
     /// Every blob in the store.
     fn blobs(&self) -> Vec<PathBuf> {
         self.files("v2/cas")
@@ -263,11 +272,7 @@ fn flipped_bit_in_a_blob_is_found_and_rebuilt() {
     let place = Place::new();
     place.write("a.txt", "kiln");
     place.run(1);
-    for path in place.blobs() {
-        let mut bytes = fs::read(&path).unwrap();
-        bytes[0] ^= 1;
-        fs::write(&path, bytes).unwrap();
-    }
+    place.damage_blobs();
     let store = place.store();
     let digest = Digest::of(b"KILN");
     assert_eq!(store.get(&digest), None);
@@ -582,11 +587,7 @@ fn damaged_file_that_cannot_be_removed_is_replaced() {
     let place = Place::new();
     place.write("a.txt", "kiln");
     place.run(1);
-    for path in place.blobs() {
-        let mut bytes = fs::read(&path).unwrap();
-        bytes[0] ^= 1;
-        fs::write(&path, bytes).unwrap();
-    }
+    place.damage_blobs();
     // Opening a store makes and removes a file beside its folders.
     let denying = Denying(|operation, path| {
         operation == Operation::Remove && path.parent().is_none_or(|folder| !folder.ends_with("v2"))
