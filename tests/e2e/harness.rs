@@ -80,8 +80,12 @@ impl Project {
         std::fs::read_to_string(self.path(name)).unwrap()
     }
 
+    /// Saves a file whole, as careful editors do: a busy machine sees no half of it.
     pub fn write(&self, name: &str, content: impl AsRef<[u8]>) {
-        std::fs::write(self.path(name), content).unwrap();
+        let path = self.path(name);
+        let new = path.with_extension("being-saved");
+        std::fs::write(&new, content).unwrap();
+        std::fs::rename(new, path).unwrap();
     }
 
     pub fn edit(&self, name: &str, from: &str, to: &str) {

@@ -229,7 +229,9 @@ impl Daemon {
                 return;
             }
             BuildResult::OutputsFailed(error) => return notify(Notice::Failed(error.to_string())),
-            BuildResult::Overlooked(files) => return self.take_files(Batch::now(files.clone()), notify),
+            BuildResult::Overlooked(files) => {
+                return self.take_files(Batch::now(self.watch.with_other_names(files.clone())), notify);
+            }
             BuildResult::Cancelled(batch) => batch.clone(),
             BuildResult::Done(_) | BuildResult::Failed(_) => Batch::default(),
         };
@@ -253,7 +255,8 @@ impl Daemon {
             self.watch.set_relevant(&relevant);
             let old: HashSet<&String> = self.relevant.iter().collect();
             let new = relevant.iter().filter(|path| !old.contains(path));
-            unseen.merge(Batch::now(sources.changed_since_seen(new, || true)));
+            let changed = sources.changed_since_seen(new, || true);
+            unseen.merge(Batch::now(self.watch.with_other_names(changed)));
             self.relevant = relevant;
         }
         if !unseen.files.is_empty() {

@@ -110,6 +110,10 @@ fn file_of_two_names_changes_under_both() {
     let (sender, batches) = channel();
     let mut watch = Watch::start(&project, move |batch| drop(sender.send(batch))).unwrap();
     watch.set_relevant(&["one.wgsl".to_owned(), "two.wgsl".to_owned()]);
+    let both = names(&["one.wgsl", "two.wgsl"]);
+    let seen_under_one = watch.with_other_names(vec!["two.wgsl".to_owned()]);
+    assert_eq!(seen_under_one.into_iter().collect::<BTreeSet<_>>(), both);
+    assert_eq!(watch.with_other_names(vec!["three.wgsl".to_owned()]), ["three.wgsl"]);
     fs::write(project.join("one.wgsl"), "after").unwrap();
-    assert_eq!(batches.recv_timeout(LIMIT).unwrap().files, names(&["one.wgsl", "two.wgsl"]));
+    assert_eq!(batches.recv_timeout(LIMIT).unwrap().files, both);
 }

@@ -74,6 +74,16 @@ impl Watch {
         self.has_links
     }
 
+    /// These files and all other names of the same files: an edit reaches the readers of a file, by whatever name, in
+    /// one build.
+    pub(crate) fn with_other_names(&self, mut names: Vec<String>) -> Vec<String> {
+        let relevant = self.relevant.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_same = |known: &&BTreeSet<String>| names.iter().any(|name| known.contains(name));
+        let others: Vec<String> = relevant.values().filter(is_same).flatten().cloned().collect();
+        names.extend(others);
+        names
+    }
+
     /// Says which sources matter (project-relative, missing ones too). Those that lie outside the folder, or are
     /// links to files outside, are watched where they are.
     pub(crate) fn set_relevant(&mut self, names: &[String]) {

@@ -294,3 +294,21 @@ fn cache_that_cannot_be_written_is_read_and_nothing_in_it_changes() {
     drop(engine);
     assert_eq!(place.files("v2"), before);
 }
+
+#[test]
+fn damaged_file_that_cannot_be_removed_is_replaced() {
+    let place = Place::new();
+    place.write("a.txt", "kiln");
+    place.run(1);
+    place.damage_blobs();
+    // Opening a store makes and removes a file beside its folders.
+    let denying = Denying(|operation, path| {
+        operation == Operation::Remove && path.parent().is_none_or(|folder| !folder.ends_with("v2"))
+    });
+    let store = Store::open_on(Arc::new(denying), place.cache.path()).unwrap();
+    let engine = Engine::open(place.folder.path(), store).unwrap();
+    let digest = Digest::of(b"KILN");
+    assert_eq!(engine.store().get(&digest), None);
+    assert_eq!(run(&engine, &two_steps(&engine), 1).ended.len(), 1);
+    assert_eq!(engine.store().get(&digest).as_deref(), Some(b"KILN".as_slice()));
+}

@@ -546,27 +546,6 @@ fn lost_result_is_made_again_only_for_those_that_need_it() {
 }
 
 #[test]
-fn equal_work_under_two_names_runs_once() {
-    let place = Place::new();
-    let engine = place.engine();
-    let mut graph = Graph::default();
-    let runs = Arc::new(AtomicUsize::new(0));
-    for name in ["a", "b", "c"] {
-        let first = action("first", json!({}), vec![], &["text"], |_| Ok(made("text", "same")));
-        let first = graph.add(Action { name: format!("first {name}"), ..first });
-        let runs = runs.clone();
-        let text = Input::Output { action: first, output: "text".into() };
-        let second = action("second", json!({}), vec![text], &["text"], move |inputs| {
-            runs.fetch_add(1, Ordering::SeqCst);
-            Ok(made("text", &*inputs.required(0)?))
-        });
-        graph.add(Action { name: format!("second {name}"), ..second });
-    }
-    assert_eq!(run(&engine, &graph, 3).ended.len(), 2);
-    assert_eq!(runs.load(Ordering::SeqCst), 1);
-}
-
-#[test]
 fn builds_of_two_processes_are_both_remembered() {
     let place = Place::new();
     place.write("a.txt", "kiln");
@@ -580,22 +559,4 @@ fn builds_of_two_processes_are_both_remembered() {
     let engine = place.engine();
     assert_eq!(engine.builds().iter().map(|build| build.number).collect::<Vec<_>>(), [1, 2, 3]);
     assert_eq!(engine.history("upper a.txt").unwrap().1.build, 3);
-}
-
-#[test]
-fn damaged_file_that_cannot_be_removed_is_replaced() {
-    let place = Place::new();
-    place.write("a.txt", "kiln");
-    place.run(1);
-    place.damage_blobs();
-    // Opening a store makes and removes a file beside its folders.
-    let denying = Denying(|operation, path| {
-        operation == Operation::Remove && path.parent().is_none_or(|folder| !folder.ends_with("v2"))
-    });
-    let store = Store::open_on(Arc::new(denying), place.cache.path()).unwrap();
-    let engine = Engine::open(place.folder.path(), store).unwrap();
-    let digest = Digest::of(b"KILN");
-    assert_eq!(engine.store().get(&digest), None);
-    assert_eq!(run(&engine, &two_steps(&engine), 1).ended.len(), 1);
-    assert_eq!(engine.store().get(&digest).as_deref(), Some(b"KILN".as_slice()));
 }

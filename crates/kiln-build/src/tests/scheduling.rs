@@ -131,3 +131,24 @@ fn processes_that_race_on_one_key_leave_one_result() {
     assert_eq!(place.files("v2/actions").len(), 2);
     assert!(place.run(1).1.is_empty());
 }
+
+#[test]
+fn equal_work_under_two_names_runs_once() {
+    let place = Place::new();
+    let engine = place.engine();
+    let mut graph = Graph::default();
+    let runs = Arc::new(AtomicUsize::new(0));
+    for name in ["a", "b", "c"] {
+        let first = action("first", json!({}), vec![], &["text"], |_| Ok(made("text", "same")));
+        let first = graph.add(Action { name: format!("first {name}"), ..first });
+        let runs = runs.clone();
+        let text = Input::Output { action: first, output: "text".into() };
+        let second = action("second", json!({}), vec![text], &["text"], move |inputs| {
+            runs.fetch_add(1, Ordering::SeqCst);
+            Ok(made("text", &*inputs.required(0)?))
+        });
+        graph.add(Action { name: format!("second {name}"), ..second });
+    }
+    assert_eq!(run(&engine, &graph, 3).ended.len(), 2);
+    assert_eq!(runs.load(Ordering::SeqCst), 1);
+}
