@@ -3,7 +3,7 @@
 use crate::bright::{BrightTexel, take_brightest};
 use crate::patch::Patch;
 use kiln_image::Panorama;
-use kiln_sphere::{Bulk, Cancel, Cancelled, Harmonics, kernel_ggx};
+use kiln_sphere::{Bulk, Cancel, Cancelled, Harmonics, Lobe};
 use std::f64::consts::PI;
 
 /// Highest band limit [`analyse`] chooses: GGX of α = 1/256 to 1e-4. Beyond it memory, not time, is the limit
@@ -19,6 +19,8 @@ pub(crate) const LOW_BAND_LIMIT: usize = 8;
 pub struct AnalysisRequest {
     /// Smallest GGX α that will be asked for; (0, 1].
     pub alpha_min: f64,
+    /// Smallest Charlie α, where there will be sheen maps; (0, 1].
+    pub sheen_alpha_min: Option<f64>,
     /// Relative RMS error each prefiltered map may have from the transform, encoding not counted.
     pub error: f64,
 }
@@ -121,10 +123,14 @@ pub(crate) fn choose_band_limit(
         return Ok(LOW_BAND_LIMIT);
     }
     let allowed = 0.5 * request.error * (square(mean) / variance).sqrt();
-    let alpha = crate::prefilter::usable_alpha(request.alpha_min);
-    let kappa = kernel_ggx(alpha, BAND_LIMIT_MAX, cancel)?.kappa;
-    let last_needed = kappa.iter().rposition(|k| k.abs() > allowed || allowed.is_nan()).unwrap_or(0);
-    Ok(last_needed.max(LOW_BAND_LIMIT))
+    let sheen = request.sheen_alpha_min.map(|alpha| Lobe::Charlie { alpha });
+    let mut band_limit = LOW_BAND_LIMIT;
+    for lobe in [Lobe::Ggx { alpha: request.alpha_min }].into_iter().chain(sheen) {
+        let kappa = crate::prefilter::usable(lobe).kernel(BAND_LIMIT_MAX, cancel)?.kappa;
+        let last_needed = kappa.iter().rposition(|k| k.abs() > allowed || allowed.is_nan()).unwrap_or(0);
+        band_limit = band_limit.max(last_needed);
+    }
+    Ok(band_limit)
 }
 
 /// ∫ |f|² dω of constant patches, summed over the channels.

@@ -21,6 +21,7 @@ mod analysis;
 mod bright;
 mod bytes;
 mod encode;
+mod measure;
 pub mod memory;
 mod patch;
 mod prefilter;
@@ -31,12 +32,13 @@ mod tables;
 #[cfg(test)]
 mod tests;
 
-pub use kiln_sphere::{Bulk, Cancel, Cancelled};
+pub use kiln_sphere::{Bulk, Cancel, Cancelled, Lobe};
 
 pub use analysis::{Analysis, AnalysisRequest, BAND_LIMIT_MAX, BRIGHT_MAX, analyse};
 pub use bytes::BakeError;
 pub use encode::{EncodedLevel, TexelFormat, encode_level, scale_log2};
-pub use prefilter::{ALPHA_MIN, Accuracy, Prefiltered, irradiance, specular_level};
+pub use measure::{BruteForce, Measured};
+pub use prefilter::{ALPHA_MIN, Accuracy, Prefiltered, irradiance, sheen_level, specular_level};
 pub use reference::reference_radiance;
 pub use sh::{ShCoefficients, irradiance_sh, sh};
 pub use skybox::skybox;

@@ -76,7 +76,7 @@ const CONTRAST_MAX: f64 = 30.0;
 /// takes all degrees L if by them alone its error can exceed a quarter of `error`: with Σ_{l > L} κ_l² (2l + 1)/4π ≈ 0.14/L³
 /// (see `Truncation::choose`) that ends at L = 1.9 √(contrast/error).
 fn band_limit_needed(alpha: f64, error: f64) -> usize {
-    let lobe = 11.0 / crate::prefilter::usable_alpha(alpha);
+    let lobe = 11.0 / alpha.clamp(crate::ALPHA_MIN, 1.0);
     let horizon = 1.9 * (CONTRAST_MAX / error).sqrt();
     lobe.max(horizon) as usize
 }

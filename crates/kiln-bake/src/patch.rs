@@ -1,6 +1,6 @@
 //! A texel as a patch of the sphere, and the integral of a lobe over it.
 
-use kiln_sphere::ggx_kernel_at;
+use kiln_sphere::ZonalKernel;
 use kiln_sphere::quadrature::gauss_legendre;
 use std::f64::consts::PI;
 use std::sync::OnceLock;
@@ -17,6 +17,14 @@ pub(crate) struct Patch {
 pub(crate) struct Node {
     pub(crate) direction: [f64; 3],
     pub(crate) solid_angle_sr: f64,
+}
+
+/// A small part of a patch, as a parallelogram: its centre and its edges' vectors.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cell {
+    pub(crate) node: Node,
+    pub(crate) down: [f64; 3],
+    pub(crate) right: [f64; 3],
 }
 
 impl Patch {
@@ -47,6 +55,17 @@ impl Patch {
         let [top, bottom] = self.theta;
         let (mid, half) = (0.5 * (top + bottom), 0.5 * (bottom - top));
         (self.lambda[1] - self.lambda[0]) * 2.0 * libm::sin(mid) * libm::sin(half)
+    }
+
+    /// The one point that stands for the patch to second order.
+    pub(crate) fn centroid(&self) -> Node {
+        let (middle, height) = (0.5 * (self.theta[0] + self.theta[1]), self.theta[1] - self.theta[0]);
+        let (sin_theta, cos_theta) = libm::sincos(middle + centroid_offset(middle, height));
+        let (sin_lambda, cos_lambda) = libm::sincos(0.5 * (self.lambda[0] + self.lambda[1]));
+        Node {
+            direction: direction(sin_theta, cos_theta, sin_lambda, cos_lambda),
+            solid_angle_sr: self.solid_angle_sr(),
+        }
     }
 
     /// Product Gauss rule with `count` points a side.
@@ -81,9 +100,15 @@ impl Patch {
         }
     }
 
-    /// ∫_patch K dω of the unnormalised GGX kernel around `axis`; halves the patch until `size_max` times the
-    /// lobe's local scale, then takes a Gauss rule of `count`² points.
-    pub(crate) fn integrate_ggx(&self, alpha: f64, axis: [f64; 3], size_max: f64, count: usize) -> f64 {
+    /// ∫_patch K dω around `axis`; halves the patch until `size_max` times the kernel's local scale, then takes a Gauss
+    /// rule of `count`² points.
+    pub(crate) fn integrate(
+        &self,
+        profile: &impl ZonalKernel,
+        axis: [f64; 3],
+        size_max: f64,
+        count: usize,
+    ) -> f64 {
         let size = self.size();
         let centre = self.nodes(1)[0].direction;
         let distance2 = distance2(centre, axis);
@@ -92,20 +117,20 @@ impl Patch {
         }
         // The nearest point of the patch is where the kernel varies fastest.
         let chord = (distance2.sqrt() - 0.75 * size).max(0.0);
-        let is_smooth = size * size <= size_max * size_max * lobe_scale2(alpha, chord * chord);
+        let is_smooth = size * size <= size_max * size_max * profile.scale2(chord * chord);
         if !is_smooth && size >= 1e-9 {
-            return self.split().iter().map(|half| half.integrate_ggx(alpha, axis, size_max, count)).sum();
+            return self.split().iter().map(|half| half.integrate(profile, axis, size_max, count)).sum();
         }
         if is_on_horizon(distance2, size) {
-            return self.integrate_lit(alpha, axis, count.max(6));
+            return self.integrate_lit(profile, axis, count.max(6));
         }
-        self.nodes(count).iter().map(|node| node.solid_angle_sr * ggx_at(alpha, node, axis)).sum()
+        self.nodes(count).iter().map(|node| node.solid_angle_sr * kernel_at(profile, node, axis)).sum()
     }
 
     /// ∫ K dω over the part of the patch above the horizon of `axis`, by Gauss rules between all kinks.
     ///
     /// With the axis at (θ_a, λ_a) a point is lit where |λ − λ_a| < acos c, c = −cos θ_a cos θ / (sin θ_a sin θ).
-    fn integrate_lit(&self, alpha: f64, axis: [f64; 3], count: usize) -> f64 {
+    fn integrate_lit(&self, profile: &impl ZonalKernel, axis: [f64; 3], count: usize) -> f64 {
         let (along, across) = (axis[1], libm::hypot(axis[0], axis[2]));
         let lambda_axis = libm::atan2(-axis[0], axis[2]);
         let mut sum = 0.0;
@@ -119,13 +144,37 @@ impl Patch {
                     let start = self.lambda[0].max(lambda_axis + turn - width);
                     let end = self.lambda[1].min(lambda_axis + turn + width);
                     if start < end {
-                        let arc = arc_integral(sin_theta, cos_theta, [start, end], alpha, axis, gauss(count));
+                        let arc =
+                            arc_integral(sin_theta, cos_theta, [start, end], profile, axis, gauss(count));
                         sum += weight * half * sin_theta * arc;
                     }
                 }
             }
         }
         sum
+    }
+
+    /// `count`² cells of equal angles, each with its edges.
+    pub(crate) fn cells(&self, count: usize) -> Vec<Cell> {
+        let part = |[a, b]: [f64; 2], index: usize| {
+            let at = |index: usize| a + (b - a) * index as f64 / count as f64;
+            [at(index), at(index + 1)]
+        };
+        let cell = |index: usize| {
+            let theta = part(self.theta, index / count);
+            let lambda = part(self.lambda, index % count);
+            let node = Patch { theta, lambda }.centroid();
+            let [x, y, z] = node.direction;
+            let sin_theta = libm::hypot(x, z);
+            let (height, width) = (theta[1] - theta[0], lambda[1] - lambda[0]);
+            let turn = height * y / sin_theta.max(f64::MIN_POSITIVE);
+            Cell {
+                node,
+                down: [x * turn, -sin_theta * height, z * turn],
+                right: [-z * width, 0.0, x * width],
+            }
+        };
+        (0..count * count).map(cell).collect()
     }
 
     /// The patch's θ range, cut where the horizon meets a meridian of its edge or turns back:
@@ -150,7 +199,7 @@ fn arc_integral(
     sin_theta: f64,
     cos_theta: f64,
     [start, end]: [f64; 2],
-    alpha: f64,
+    profile: &impl ZonalKernel,
     axis: [f64; 3],
     rule: &[(f64, f64)],
 ) -> f64 {
@@ -159,7 +208,7 @@ fn arc_integral(
         let (sin_lambda, cos_lambda) = libm::sincos(start + half * (1.0 + x));
         let node =
             Node { direction: direction(sin_theta, cos_theta, sin_lambda, cos_lambda), solid_angle_sr: 1.0 };
-        weight * half * ggx_at(alpha, &node, axis)
+        weight * half * kernel_at(profile, &node, axis)
     };
     rule.iter().map(term).sum()
 }
@@ -196,15 +245,14 @@ pub(crate) fn distance2(a: [f64; 3], b: [f64; 3]) -> f64 {
     x * x + y * y + z * z
 }
 
-/// Squared distance to the GGX kernel's nearest pole in the complex plane, seen at a chord from the axis:
-/// α² (1 − s) + s = 0 with s = chord²/4 lies at chord ≈ ±2iα.
+/// From the middle of a patch's θ range to the centroid of its sin θ.
 #[inline]
-pub(crate) fn lobe_scale2(alpha: f64, chord2: f64) -> f64 {
-    chord2 + 4.0 * alpha * alpha
+pub(crate) fn centroid_offset(middle: f64, height: f64) -> f64 {
+    height * height / 12.0 * libm::cos(middle) / libm::sin(middle)
 }
 
-/// The unnormalised GGX kernel at a node.
+/// The kernel at a node.
 #[inline]
-pub(crate) fn ggx_at(alpha: f64, node: &Node, axis: [f64; 3]) -> f64 {
-    ggx_kernel_at(alpha, 0.5 * distance2(node.direction, axis))
+pub(crate) fn kernel_at(profile: &impl ZonalKernel, node: &Node, axis: [f64; 3]) -> f64 {
+    profile.at(0.5 * distance2(node.direction, axis))
 }

@@ -1,11 +1,11 @@
 //! Prefiltered cube maps: one multiplication per harmonic, one synthesis, the bright texels on top.
 
 use crate::analysis::Analysis;
-use crate::bright::BrightSet;
+use crate::bright::{BrightSet, LANES};
 use kiln_image::Cube;
 use kiln_sphere::direction::cube_texel_centre;
 use kiln_sphere::{
-    Bulk, Cancel, Cancelled, Kernel, cube_direction, cube_texel_solid_angle_sr, kernel_ggx, kernel_lambert,
+    Bulk, Cancel, Cancelled, CubeSolidAngles, Kernel, Lobe, Profile, ZonalKernel, cube_direction, simd,
     synthesise_cube,
 };
 use rayon::prelude::*;
@@ -49,8 +49,21 @@ pub fn specular_level(
     face_size: usize,
     cancel: Cancel,
 ) -> Result<Prefiltered, Cancelled> {
-    let alpha = usable_alpha(alpha);
-    prefilter(analysis, &kernel_ggx(alpha, analysis.band_limit(), cancel)?, alpha, face_size, cancel)
+    prefilter(analysis, Lobe::Ggx { alpha }, face_size, cancel)
+}
+
+/// The environment convolved with the Charlie lobe of N = V = R, for one mip level of a sheen map; `alpha` as in
+/// [`specular_level`].
+///
+/// # Errors
+/// [`Cancelled`] within the work of a block of rings or a row of texels.
+pub fn sheen_level(
+    analysis: &Analysis,
+    alpha: f64,
+    face_size: usize,
+    cancel: Cancel,
+) -> Result<Prefiltered, Cancelled> {
+    prefilter(analysis, Lobe::Charlie { alpha }, face_size, cancel)
 }
 
 /// The environment's irradiance over π, E/π: convolved with max(cos θ, 0)/π, which is GGX of α = 1.
@@ -58,24 +71,35 @@ pub fn specular_level(
 /// # Errors
 /// [`Cancelled`] within the work of a block of rings or a row of texels.
 pub fn irradiance(analysis: &Analysis, face_size: usize, cancel: Cancel) -> Result<Prefiltered, Cancelled> {
-    prefilter(analysis, &kernel_lambert(analysis.band_limit()), 1.0, face_size, cancel)
+    prefilter(analysis, Lobe::Lambert, face_size, cancel)
 }
 
-pub(crate) fn usable_alpha(alpha: f64) -> f64 {
-    if alpha >= ALPHA_MIN { alpha.min(1.0) } else { ALPHA_MIN }
+/// The lobe with its α brought into [[`ALPHA_MIN`], 1].
+pub(crate) fn usable(lobe: Lobe) -> Lobe {
+    let usable = |alpha: f64| if alpha >= ALPHA_MIN { alpha.min(1.0) } else { ALPHA_MIN };
+    match lobe {
+        Lobe::Lambert => Lobe::Lambert,
+        Lobe::Ggx { alpha } => Lobe::Ggx { alpha: usable(alpha) },
+        Lobe::Charlie { alpha } => Lobe::Charlie { alpha: usable(alpha) },
+    }
 }
 
+/// The environment convolved with a lobe.
 fn prefilter(
     analysis: &Analysis,
-    kernel: &Kernel,
-    alpha: f64,
+    lobe: Lobe,
     face_size: usize,
     cancel: Cancel,
 ) -> Result<Prefiltered, Cancelled> {
-    let truncation = Truncation::choose(analysis, kernel, cancel)?;
+    let lobe = usable(lobe);
+    let kernel = lobe.kernel(analysis.band_limit(), cancel)?;
+    let truncation = Truncation::choose(analysis, &kernel, cancel)?;
     let kappa = &kernel.kappa[..=truncation.band_limit];
     let mut values = synthesise_cube(&analysis.dim, kappa, face_size, cancel)?;
-    add_bright(analysis, alpha, libm::exp(-kernel.ln_norm), face_size, &mut values, cancel)?;
+    match lobe.profile(kernel.ln_norm) {
+        Profile::Ggx(kernel) => add_bright(analysis, kernel, face_size, &mut values, cancel)?,
+        Profile::Charlie(kernel) => add_bright(analysis, kernel, face_size, &mut values, cancel)?,
+    }
     let clamped_flux = clamp(analysis, face_size, &mut values, cancel)?;
     let mut largest = 0.0;
     let mut rgb = Bulk::new(Vec::with_capacity(values.len()));
@@ -85,29 +109,43 @@ fn prefilter(
         rgb.extend(line.iter().map(|&value| value as f32));
     }
     let cube = Cube { face_size, rgb: rgb.into_inner() };
-    Ok(Prefiltered { cube, accuracy: truncation.accuracy(largest, clamped_flux) })
+    Ok(Prefiltered {
+        cube,
+        accuracy: truncation.accuracy(largest, clamped_flux, evaluation_error(analysis.error)),
+    })
 }
 
-/// Adds the bright texels' share, Σ excess ∫_patch K dω / ∫ K dω.
+/// Adds the bright texels' share, Σ excess ∫_patch K dω.
 fn add_bright(
     analysis: &Analysis,
-    alpha: f64,
-    inverse_norm: f64,
+    kernel: impl ZonalKernel,
     face_size: usize,
     rgb: &mut [f64],
     cancel: Cancel,
 ) -> Result<(), Cancelled> {
-    let bright = BrightSet::new(analysis.width, analysis.height, &analysis.bright);
+    let Analysis { width, height, bright, .. } = analysis;
     if bright.is_empty() {
         return Ok(());
     }
+    let bright = BrightSet::new(*width, *height, bright, kernel, rule_error(analysis.error));
     rgb.par_chunks_mut(face_size * 3).enumerate().try_for_each(|(line, texels)| {
         let t = cube_texel_centre(face_size, line % face_size);
-        for (x, texel) in texels.chunks_exact_mut(3).enumerate() {
+        for (block, texels) in texels.chunks_mut(LANES * 3).enumerate() {
             cancel.check()?;
-            let axis = cube_direction(line / face_size, cube_texel_centre(face_size, x), t);
-            for (value, share) in texel.iter_mut().zip(bright.convolve_ggx(alpha, axis)) {
-                *value += share * inverse_norm;
+            let axis = |lane: usize| {
+                let x = (block * LANES + lane).min(face_size - 1);
+                cube_direction(line / face_size, cube_texel_centre(face_size, x), t)
+            };
+            let axes = std::array::from_fn::<_, LANES, _>(axis);
+            let axes = std::array::from_fn(|i| axes.map(|axis| axis[i]));
+            let shares = simd::dispatch(
+                #[inline(always)]
+                || bright.convolve(&axes),
+            );
+            for (lane, texel) in texels.chunks_exact_mut(3).enumerate() {
+                for (value, share) in texel.iter_mut().zip(&shares) {
+                    *value += share[lane];
+                }
             }
         }
         Ok(())
@@ -117,6 +155,7 @@ fn add_bright(
 /// Brings values into the environment's range; returns the flux moved relative to all flux.
 fn clamp(analysis: &Analysis, face_size: usize, rgb: &mut [f64], cancel: Cancel) -> Result<f64, Cancelled> {
     let (mut moved, mut total) = (0.0, 0.0);
+    let solid_angles = CubeSolidAngles::new(face_size);
     for (index, texel) in rgb.chunks_exact_mut(3).enumerate() {
         let (x, y) = (index % face_size, index / face_size % face_size);
         if x == 0 {
@@ -129,16 +168,23 @@ fn clamp(analysis: &Analysis, face_size: usize, rgb: &mut [f64], cancel: Cancel)
             texel_total += inside.abs();
             *value = inside;
         }
-        let solid_angle_sr = cube_texel_solid_angle_sr(face_size, x, y);
+        let solid_angle_sr = solid_angles.at(x, y);
         moved += solid_angle_sr * texel_moved;
         total += solid_angle_sr * texel_total;
     }
     Ok(if total > 0.0 { moved / total } else { 0.0 })
 }
 
-/// Relative error of evaluation apart from truncation: the window of the synthesis, the bright texels' rules (1e-7
-/// each) and rounding to `f32`. Measured, not proved.
-const EVALUATION_ERROR: f64 = 3e-7;
+/// What the bright texels' rules may leave: little beside the error asked for.
+fn rule_error(error: f64) -> f64 {
+    (0.05 * error).clamp(1e-9, 1e-4)
+}
+
+/// Relative error of evaluation apart from truncation: the window of the synthesis and rounding to `f32` (measured, not
+/// proved), and the bright texels' rules.
+fn evaluation_error(error: f64) -> f64 {
+    2e-7 + rule_error(error)
+}
 
 /// How many degrees a map takes and what the others could have added.
 struct Truncation {
@@ -181,11 +227,11 @@ impl Truncation {
     }
 
     /// `largest`: norm of the map's brightest texel, which evaluation errors are relative to.
-    fn accuracy(&self, largest: f64, clamped_flux: f64) -> Accuracy {
+    fn accuracy(&self, largest: f64, clamped_flux: f64, evaluation_error: f64) -> Accuracy {
         let relative = |error: f64, size: f64| if size > 0.0 { error / size } else { 0.0 };
         Accuracy {
-            rms_bound: relative(self.energy.sqrt(), self.map_energy.sqrt()) + EVALUATION_ERROR,
-            sup_bound: relative(self.sup + EVALUATION_ERROR * largest, self.mean),
+            rms_bound: relative(self.energy.sqrt(), self.map_energy.sqrt()) + evaluation_error,
+            sup_bound: relative(self.sup + evaluation_error * largest, self.mean),
             clamped_flux,
             band_limit: self.band_limit,
         }

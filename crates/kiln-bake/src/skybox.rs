@@ -7,7 +7,7 @@
 
 use kiln_image::{Cube, Panorama};
 use kiln_sphere::quadrature::gauss_legendre;
-use kiln_sphere::{Bulk, Cancel, Cancelled, cube_direction, cube_texel_solid_angle_sr, panorama_uv};
+use kiln_sphere::{Bulk, Cancel, Cancelled, CubeSolidAngles, cube_direction, panorama_uv};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
@@ -32,16 +32,22 @@ fn resample(panorama: &Panorama, face_size: usize, cancel: Cancel) -> Result<Cub
     let sampler = Sampler::new(panorama, face_size);
     // Side faces column by column, caps whole and still as sums.
     let mut sides = Bulk::new(vec![Vec::new(); 4 * face_size]);
-    sides.par_iter_mut().enumerate().try_for_each(|(index, column)| {
-        let sums = sampler.side_column([0, 1, 4, 5][index / face_size], index % face_size, cancel)?;
-        *column = sums.into_iter().map(mean).collect();
-        Ok(())
-    })?;
     let mut caps = Bulk::new([Vec::new(), Vec::new()]);
-    caps.par_iter_mut().enumerate().try_for_each(|(index, sums)| {
-        *sums = sampler.cap(2 + index, cancel)?;
-        Ok(())
-    })?;
+    let resample_sides = || {
+        sides.par_iter_mut().enumerate().try_for_each(|(index, column)| {
+            let sums = sampler.side_column([0, 1, 4, 5][index / face_size], index % face_size, cancel)?;
+            *column = sums.into_iter().map(mean).collect();
+            Ok(())
+        })
+    };
+    let resample_caps = || {
+        caps.par_iter_mut().enumerate().try_for_each(|(index, sums)| {
+            *sums = sampler.cap(2 + index, cancel)?;
+            Ok(())
+        })
+    };
+    let (of_caps, of_sides) = rayon::join(resample_caps, resample_sides);
+    of_caps.and(of_sides)?;
     let texel = |face: usize, y: usize, x: usize| match face {
         2 | 3 => mean(caps[face - 2][y * face_size + x]),
         0 | 1 => sides[face * face_size + x][y],
@@ -63,20 +69,21 @@ fn mean([r, g, b, total]: [f64; 4]) -> [f32; 3] {
 
 fn halve(cube: &Cube, cancel: Cancel) -> Result<Cube, Cancelled> {
     let size = cube.face_size / 2;
+    let solid_angles = CubeSolidAngles::new(cube.face_size);
     let mut rgb = Bulk::new(Vec::with_capacity(6 * size * size * 3));
     for line in 0..6 * size {
         cancel.check()?;
-        rgb.extend((0..size).flat_map(|x| half_texel(cube, line / size, line % size, x)));
+        rgb.extend((0..size).flat_map(|x| half_texel(cube, &solid_angles, line / size, line % size, x)));
     }
     Ok(Cube { face_size: size, rgb: rgb.into_inner() })
 }
 
 /// The mean of the four texels that a texel of the next level covers.
-fn half_texel(cube: &Cube, face: usize, y: usize, x: usize) -> [f32; 3] {
+fn half_texel(cube: &Cube, solid_angles: &CubeSolidAngles, face: usize, y: usize, x: usize) -> [f32; 3] {
     let (mut sum, mut total) = ([0.0; 3], 0.0);
     for (dy, dx) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         let (x, y) = (2 * x + dx, 2 * y + dy);
-        let weight = cube_texel_solid_angle_sr(cube.face_size, x, y);
+        let weight = solid_angles.at(x, y);
         let texel = ((face * cube.face_size + y) * cube.face_size + x) * 3;
         for (sum, &value) in sum.iter_mut().zip(&cube.rgb[texel..]) {
             *sum += weight * f64::from(value);
@@ -87,17 +94,17 @@ fn half_texel(cube: &Cube, face: usize, y: usize, x: usize) -> [f32; 3] {
 }
 
 /// Lines across a side face's piece between meridians.
-const LINES: usize = 3;
+const LINES: usize = 2;
 /// Rays across a cap's piece between meridians; pieces are so many that a texel at the edge sees at least these.
-const RAYS: usize = 8;
+const RAYS: usize = 4;
 
 struct Sampler<'a> {
     panorama: &'a Panorama,
     face_size: usize,
     /// Texel edges, −1 … 1.
     edges: Vec<f64>,
-    /// cot θ of the parallels between rows, north to south.
-    parallels_cot: Vec<f64>,
+    /// (cot θ, cos θ) of the parallels between rows, north to south.
+    parallels: Vec<[f64; 2]>,
     lines: Vec<(f64, f64)>,
     rays: Vec<(f64, f64)>,
 }
@@ -105,15 +112,15 @@ struct Sampler<'a> {
 impl<'a> Sampler<'a> {
     fn new(panorama: &'a Panorama, face_size: usize) -> Self {
         let height = panorama.height();
-        let cot = |row: usize| {
+        let parallel = |row: usize| {
             let (sin, cos) = libm::sincos(PI * row as f64 / height as f64);
-            cos / sin
+            [cos / sin, cos]
         };
         Self {
             panorama,
             face_size,
             edges: (0..=face_size).map(|i| 2.0 * i as f64 / face_size as f64 - 1.0).collect(),
-            parallels_cot: (1..height).map(cot).collect(),
+            parallels: (1..height).map(parallel).collect(),
             lines: gauss_legendre(LINES),
             rays: gauss_legendre(RAYS),
         }
@@ -122,13 +129,14 @@ impl<'a> Sampler<'a> {
     /// ∫ (f, 1) dω over the texels (x, 0), (x, 1) … of a side face.
     fn side_column(&self, face: usize, x: usize, cancel: Cancel) -> Result<Vec<[f64; 4]>, Cancelled> {
         let mut sums = vec![[0.0; 4]; self.face_size];
+        let mut at_edges = vec![0.0; self.face_size + 1];
         for piece in self.between_meridians(face, x).windows(2) {
             cancel.check()?;
             let half = 0.5 * (piece[1] - piece[0]);
             let u = panorama_uv(cube_direction(face, piece[0] + half, 0.0))[0];
             let column = self.column_at(u);
             for &(y, weight) in &self.lines {
-                self.add_line(piece[0] + half * (1.0 + y), weight * half, column, &mut sums);
+                self.add_line(piece[0] + half * (1.0 + y), weight * half, column, &mut at_edges, &mut sums);
             }
         }
         Ok(sums)
@@ -144,8 +152,8 @@ impl<'a> Sampler<'a> {
         let width = self.panorama.width() as f64;
         let u_centre = panorama_uv(cube_direction(face, 0.0, 0.0))[0];
         let longitude = |s: f64| (u_centre + libm::atan(s) / (2.0 * PI)) * width;
-        let first = libm::floor(longitude(start)) as i64 + 1;
-        let inner = (first..).take_while(|&j| (j as f64) < longitude(end));
+        let (first, last) = (libm::floor(longitude(start)) as i64 + 1, longitude(end));
+        let inner = (first..).take_while(|&j| (j as f64) < last);
         let at = |j: i64| libm::tan(2.0 * PI * (j as f64 / width - u_centre));
         let mut pieces = vec![start];
         pieces.extend(inner.map(at).filter(|s| start < *s && *s < end));
@@ -154,20 +162,30 @@ impl<'a> Sampler<'a> {
     }
 
     /// Adds weight · ∫ (f, 1) (1 + s² + t²)^(−3/2) dt along a side face's line of constant s.
-    fn add_line(&self, s: f64, weight: f64, column: usize, sums: &mut [[f64; 4]]) {
+    ///
+    /// The integral up to t is t / (a √(a + t²)), a = 1 + s². A parallel meets the line at t = −cot θ √a, where that is
+    /// −cos θ / a. `at_edges` is room for it at the texels' edges.
+    fn add_line(&self, s: f64, weight: f64, column: usize, at_edges: &mut [f64], sums: &mut [[f64; 4]]) {
         let across = 1.0 + s * s;
-        // A parallel meets the line at t = −cot θ √(1 + s²).
-        let parallels: Vec<f64> = self.parallels_cot.iter().map(|cot| -cot * across.sqrt()).collect();
-        let mut cuts = self.edges.clone();
-        cuts.extend(parallels.iter().filter(|t| t.abs() < 1.0));
-        cuts.sort_unstable_by(f64::total_cmp);
-        let integral = |t: f64| t / (across * (across + t * t).sqrt());
-        let (mut texel, mut row) = (0, 0);
-        for cut in cuts.windows(2) {
-            let middle = 0.5 * (cut[0] + cut[1]);
-            row += parallels[row..].iter().take_while(|&&t| t < middle).count();
-            texel += self.edges[texel + 1..self.face_size].iter().take_while(|&&t| t < middle).count();
-            self.add(&mut sums[texel], weight * (integral(cut[1]) - integral(cut[0])), column, row);
+        let root = across.sqrt();
+        for (value, t) in at_edges.iter_mut().zip(&self.edges) {
+            *value = t / (across * (across + t * t).sqrt());
+        }
+        let t_of = |row: usize| self.parallels.get(row).map_or(f64::INFINITY, |[cot, _]| -cot * root);
+        let mut row = self.parallels.partition_point(|[cot, _]| -cot * root <= -1.0);
+        let mut next_row = t_of(row);
+        let mut before = at_edges[0];
+        for (texel, sum) in sums.iter_mut().enumerate() {
+            let edge = self.edges[texel + 1];
+            while next_row < edge {
+                let here = -self.parallels[row][1] / across;
+                self.add(sum, weight * (here - before), column, row);
+                before = here;
+                row += 1;
+                next_row = t_of(row);
+            }
+            self.add(sum, weight * (at_edges[texel + 1] - before), column, row);
+            before = at_edges[texel + 1];
         }
     }
 
@@ -192,39 +210,83 @@ impl<'a> Sampler<'a> {
         let (sin, cos) = libm::sincos(lambda);
         // x = s on both caps, z = t on top and −t on the bottom.
         let (a, b) = (-sin, if face == 2 { cos } else { -cos });
-        let end = 1.0 / a.abs().max(b.abs());
-        let height = self.panorama.height();
-        let parallels = self.parallels_cot.iter().take_while(|cot| **cot > 0.0).map(|cot| 1.0 / cot);
-        let mut cuts = vec![0.0, end];
-        cuts.extend(parallels.clone().take_while(|&rho| rho < end));
-        for component in [a, b] {
-            cuts.extend(
-                self.edges.iter().map(|edge| edge / component).filter(|rho| 0.0 < *rho && *rho < end),
-            );
-        }
-        cuts.sort_unstable_by(f64::total_cmp);
-        let mut parallels = parallels.peekable();
-        let mut row = 0;
-        let place =
-            |value: f64| ((0.5 * (value + 1.0) * self.face_size as f64) as usize).min(self.face_size - 1);
-        let mut cosine = 1.0;
-        for cut in cuts.windows(2) {
-            let middle = 0.5 * (cut[0] + cut[1]);
-            while parallels.next_if(|&rho| rho < middle).is_some() {
+        let last_row = self.panorama.height() - 1;
+        let (mut x, mut y) = (Crossings::new(&self.edges, a), Crossings::new(&self.edges, b));
+        let rho_of = |row: usize| match self.parallels.get(row) {
+            Some([cot, _]) if *cot > 0.0 => 1.0 / cot,
+            _ => f64::INFINITY,
+        };
+        let (mut row, mut next_row) = (0, rho_of(0));
+        let mut before = 1.0;
+        loop {
+            let texel = y.texel * self.face_size + x.texel;
+            let panorama_row = if face == 2 { row } else { last_row - row };
+            let rho = x.next.min(y.next);
+            if next_row < rho {
+                let here = self.parallels[row][1];
+                self.add(&mut sums[texel], weight * (before - here), column, panorama_row);
+                before = here;
                 row += 1;
+                next_row = rho_of(row);
+                continue;
             }
-            let next = 1.0 / (1.0 + cut[1] * cut[1]).sqrt();
-            let texel = place(b * middle) * self.face_size + place(a * middle);
-            let row = if face == 2 { row } else { height - 1 - row };
-            self.add(&mut sums[texel], weight * (cosine - next), column, row);
-            cosine = next;
+            let here = 1.0 / (1.0 + rho * rho).sqrt();
+            self.add(&mut sums[texel], weight * (before - here), column, panorama_row);
+            before = here;
+            let is_inside = if x.next <= y.next { x.advance() } else { y.advance() };
+            if !is_inside {
+                return;
+            }
         }
     }
 
+    #[inline(always)]
     fn add(&self, sum: &mut [f64; 4], solid_angle_sr: f64, column: usize, row: usize) {
-        let [r, g, b] = self.panorama.texel(column, row).map(f64::from);
-        for (sum, value) in sum.iter_mut().zip([r, g, b, 1.0]) {
-            *sum += solid_angle_sr * value;
+        let start = (row * self.panorama.width() + column) * 3;
+        let rgb = &self.panorama.rgb()[start..start + 3];
+        for (sum, &value) in sum.iter_mut().zip(rgb) {
+            *sum += solid_angle_sr * f64::from(value);
         }
+        sum[3] += solid_angle_sr;
+    }
+}
+
+/// Where a ray from a face's centre goes from texel to texel, along one axis.
+struct Crossings<'a> {
+    /// Edges from the centre outwards, as the ray meets them.
+    edges: &'a [f64],
+    inverse_slope: f64,
+    is_rising: bool,
+    texel: usize,
+    /// ρ of the next edge; infinite if there is none.
+    next: f64,
+}
+
+impl<'a> Crossings<'a> {
+    fn new(edges: &'a [f64], slope: f64) -> Self {
+        let face_size = edges.len() - 1;
+        let is_rising = slope >= 0.0;
+        let texel = if is_rising { face_size / 2 } else { (face_size - 1) / 2 };
+        let mut crossings = Self { edges, inverse_slope: 1.0 / slope, is_rising, texel, next: 0.0 };
+        crossings.next = crossings.rho();
+        crossings
+    }
+
+    /// ρ where the ray leaves the texel it is in.
+    fn rho(&self) -> f64 {
+        let edge = self.edges[if self.is_rising { self.texel + 1 } else { self.texel }];
+        let rho = edge * self.inverse_slope;
+        if rho.is_nan() { f64::INFINITY } else { rho }
+    }
+
+    /// On to the next texel; `false` at the face's border.
+    fn advance(&mut self) -> bool {
+        let border = if self.is_rising { self.edges.len() - 2 } else { 0 };
+        if self.texel == border {
+            return false;
+        }
+        self.texel = if self.is_rising { self.texel + 1 } else { self.texel - 1 };
+        self.next = self.rho();
+        true
     }
 }

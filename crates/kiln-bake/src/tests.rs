@@ -2,5 +2,6 @@
 
 mod cancelled_step_ends_soon;
 mod environments;
+mod measure;
 mod recipes;
 mod transform;

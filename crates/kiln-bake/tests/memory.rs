@@ -110,7 +110,7 @@ fn estimates_cover_the_counted_peak_and_are_no_more_than_four_times_it() {
     for (width, height, alpha, band_limit_min) in
         [(512, 256, 0.002, BAND_LIMIT_MAX), (2048, 1024, 0.004, 1200)]
     {
-        let request = AnalysisRequest { alpha_min: alpha, error: 1e-4 };
+        let request = AnalysisRequest { alpha_min: alpha, sheen_alpha_min: None, error: 1e-4 };
         let (map, never, face_size) = (panorama(width, height), Cancel::NEVER, width / 8);
         let analysis = analyse(&map, &request, never).expect(WANTED);
         assert!(analysis.band_limit() >= band_limit_min, "{}", analysis.band_limit());

@@ -136,7 +136,11 @@ impl Steps<'_> {
     fn analyse(&self, decode: ActionId) -> Action {
         let count = specular_level_count(self.env.size);
         let roughness = if count > 1 { kiln_bake::roughness_of_level(1, count) } else { 1.0 };
-        let request = AnalysisRequest { alpha_min: roughness * roughness, error: self.env.error };
+        let request = AnalysisRequest {
+            alpha_min: roughness * roughness,
+            sheen_alpha_min: None,
+            error: self.env.error,
+        };
         let params = json!({"alpha_min": request.alpha_min, "error": request.error});
         let command = command("analyse", 1, params, &["analysis"]);
         let action = self.action("", command, vec![output(decode, "panorama")], move |inputs| {

@@ -73,3 +73,43 @@ pub fn cube_texel_solid_angle_sr(face_size: usize, x: usize, y: usize) -> f64 {
     let (s0, s1, t0, t1) = (edge(x), edge(x + 1), edge(y), edge(y + 1));
     corner(s0, t0) - corner(s1, t0) - corner(s0, t1) + corner(s1, t1)
 }
+
+/// The solid angles of all texels of a face, for those who need many: see [`cube_texel_solid_angle_sr`].
+pub struct CubeSolidAngles {
+    /// The corner integral at (s, t) of edges (x, y), both from the face's centre outwards.
+    corners: Vec<f64>,
+    face_size: usize,
+}
+
+impl CubeSolidAngles {
+    /// Of faces with `face_size` texels along their edges.
+    pub fn new(face_size: usize) -> Self {
+        let edge = |index: usize| 2.0 * index as f64 / face_size as f64 - 1.0;
+        let half = face_size / 2;
+        let stride = face_size + 1;
+        let mut corners = vec![0.0; stride * stride];
+        // The integral is odd in s and in t and does not change when they are swapped.
+        for y in half..=face_size {
+            for x in y..=face_size {
+                let (s, t) = (edge(x), edge(y));
+                let value = libm::atan2(s * t, (1.0 + s * s + t * t).sqrt());
+                for (x, y) in [(x, y), (y, x)] {
+                    let (mirrored_x, mirrored_y) = (face_size - x, face_size - y);
+                    corners[y * stride + x] = value;
+                    corners[y * stride + mirrored_x] = -value;
+                    corners[mirrored_y * stride + x] = -value;
+                    corners[mirrored_y * stride + mirrored_x] = value;
+                }
+            }
+        }
+        Self { corners, face_size }
+    }
+
+    /// Of texel (`x`, `y`), in steradians.
+    #[inline]
+    pub fn at(&self, x: usize, y: usize) -> f64 {
+        let stride = self.face_size + 1;
+        let corner = |x: usize, y: usize| self.corners[y * stride + x];
+        corner(x, y) - corner(x + 1, y) - corner(x, y + 1) + corner(x + 1, y + 1)
+    }
+}

@@ -23,7 +23,9 @@ mod fft;
 mod harmonics;
 pub mod kernel;
 mod legendre;
+mod lobe;
 pub mod quadrature;
+pub mod simd;
 mod spread;
 mod synthesis;
 #[cfg(test)]
@@ -36,9 +38,10 @@ pub use analysis::{analyse, analyse_bytes};
 pub use cancel::{Bulk, Cancel, Cancelled};
 
 pub use direction::{
-    cube_direction, cube_face_st, cube_texel_solid_angle_sr, panorama_direction, panorama_uv,
+    CubeSolidAngles, cube_direction, cube_face_st, cube_texel_solid_angle_sr, panorama_direction, panorama_uv,
 };
 pub use harmonics::{Harmonics, coefficient_count};
 pub use kernel::{Kernel, ggx_kernel_at, kernel_charlie, kernel_ggx, kernel_lambert};
+pub use lobe::{CharlieProfile, GgxProfile, Lobe, Profile, ZonalKernel};
 pub use synthesis::{evaluate, synthesise_cube, synthesise_cube_bytes};
 pub use world::{real_harmonics, world_coefficients};

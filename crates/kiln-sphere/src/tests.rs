@@ -135,3 +135,14 @@ fn cube_texels_cover_the_sphere() {
         check_within("solid angle", 6.0 * sum, 4.0 * PI, 1e-11);
     }
 }
+
+#[test]
+fn solid_angles_by_table_are_those_by_formula() {
+    for face_size in [1, 2, 5, 64] {
+        let table = crate::CubeSolidAngles::new(face_size);
+        for (x, y) in (0..face_size).flat_map(|x| (0..face_size).map(move |y| (x, y))) {
+            let exact = crate::cube_texel_solid_angle_sr(face_size, x, y);
+            check_within("solid angle", table.at(x, y) / exact, 1.0, 1e-11);
+        }
+    }
+}

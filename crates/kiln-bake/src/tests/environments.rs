@@ -1,6 +1,8 @@
 //! Panoramas and checks the tests share.
 
-use crate::{Analysis, AnalysisRequest, Cancel, EncodedLevel, Prefiltered, TexelFormat, reference_radiance};
+use crate::{
+    Analysis, AnalysisRequest, Cancel, EncodedLevel, Lobe, Prefiltered, TexelFormat, reference_radiance,
+};
 use kiln_image::{Cube, Image, Panorama};
 use kiln_sphere::direction::cube_texel_centre;
 use kiln_sphere::{cube_direction, cube_texel_solid_angle_sr};
@@ -80,7 +82,8 @@ pub(super) fn measured_rms(panorama: &Panorama, alpha: f64, map: &Prefiltered) -
     let (mut error, mut size) = (0.0, 0.0);
     for (index, texel) in map.cube.rgb.chunks_exact(3).enumerate() {
         let weight = texel_solid_angle_sr(map.cube.face_size, index);
-        let exact = reference_radiance(panorama, alpha, texel_direction(map.cube.face_size, index));
+        let exact =
+            reference_radiance(panorama, Lobe::Ggx { alpha }, texel_direction(map.cube.face_size, index));
         for (value, exact) in texel.iter().zip(exact) {
             error += weight * (f64::from(*value) - exact).powi(2);
             size += weight * exact * exact;

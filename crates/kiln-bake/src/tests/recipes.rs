@@ -9,7 +9,7 @@ use crate::{
 use kiln_image::{Cube, Panorama};
 use std::f64::consts::PI;
 
-const REQUEST: AnalysisRequest = AnalysisRequest { alpha_min: 0.5, error: 1e-3 };
+const REQUEST: AnalysisRequest = AnalysisRequest { alpha_min: 0.5, sheen_alpha_min: None, error: 1e-3 };
 
 /// Mean of the green channel over the sphere.
 fn mean_of_cube(cube: &Cube) -> f64 {

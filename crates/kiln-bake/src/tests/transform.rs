@@ -4,12 +4,13 @@ use super::environments::{
     analyse, bytes_of, check_within, irradiance, measured_rms, panorama, random, specular_level, sun,
     texel_direction,
 };
-use crate::{Analysis, AnalysisRequest, BakeError, Cancel, reference_radiance};
+use crate::{Analysis, AnalysisRequest, BakeError, Cancel, Lobe, reference_radiance};
 use kiln_image::Panorama;
 use kiln_sphere::{ggx_kernel_at, kernel_ggx, panorama_direction, panorama_uv};
 
 const ALPHAS: [f64; 5] = [1.0 / 49.0, 1.0 / 16.0, 0.25, 0.5, 1.0];
-const REQUEST: AnalysisRequest = AnalysisRequest { alpha_min: 1.0 / 49.0, error: 1e-5 };
+const REQUEST: AnalysisRequest =
+    AnalysisRequest { alpha_min: 1.0 / 49.0, sheen_alpha_min: None, error: 1e-5 };
 
 #[test]
 fn constant_map_stays_constant_at_every_alpha() {
@@ -28,7 +29,8 @@ fn constant_map_stays_constant_at_every_alpha() {
 fn stated_bound_covers_the_measured_error() {
     for (map, name) in [(random(32, 16, 1), "random"), (sun(64, 32, 700), "sun"), (random(10, 5, 2), "odd")] {
         for error in [1e-2, 1e-5] {
-            let analysis = analyse(&map, &AnalysisRequest { alpha_min: 1.0 / 16.0, error });
+            let analysis =
+                analyse(&map, &AnalysisRequest { alpha_min: 1.0 / 16.0, sheen_alpha_min: None, error });
             for alpha in [1.0 / 16.0, 0.25, 1.0] {
                 let level = specular_level(&analysis, alpha, 5);
                 let measured = measured_rms(&map, alpha, &level);
@@ -54,7 +56,8 @@ fn bound_check_rejects_a_map_of_another_alpha() {
 #[test]
 fn poles_and_wrap_column_match_brute_force() {
     for map in [random(12, 6, 5), random(2, 1, 6), sun(32, 16, 0), sun(32, 16, 31 + 8 * 32)] {
-        let analysis = analyse(&map, &AnalysisRequest { alpha_min: 1.0 / 16.0, error: 1e-6 });
+        let analysis =
+            analyse(&map, &AnalysisRequest { alpha_min: 1.0 / 16.0, sheen_alpha_min: None, error: 1e-6 });
         // An odd face has texels at the poles and on the wrap column.
         let level = specular_level(&analysis, 1.0 / 16.0, 3);
         check_within("error", measured_rms(&map, 1.0 / 16.0, &level), 0.0, 3e-6);
@@ -146,7 +149,8 @@ fn equal_bytes_for_any_number_of_threads() {
 
 #[test]
 fn extreme_alphas_are_finite() {
-    let analysis = analyse(&sun(32, 16, 100), &AnalysisRequest { alpha_min: 0.1, error: 1e-3 });
+    let analysis =
+        analyse(&sun(32, 16, 100), &AnalysisRequest { alpha_min: 0.1, sheen_alpha_min: None, error: 1e-3 });
     for alpha in [0.0, -1.0, f64::NAN, 1e-9, 2.0, f64::INFINITY] {
         let level = specular_level(&analysis, alpha, 2);
         assert!(level.cube.rgb.iter().all(|value| value.is_finite()), "alpha {alpha}");
@@ -155,12 +159,13 @@ fn extreme_alphas_are_finite() {
 
 #[test]
 fn impossible_error_is_capped_and_said() {
-    let request = AnalysisRequest { alpha_min: 0.0, error: 0.0 };
+    let request = AnalysisRequest { alpha_min: 0.0, sheen_alpha_min: None, error: 0.0 };
     assert_eq!(
         crate::analysis::choose_band_limit(&request, [1.0; 3], 20.0, Cancel::NEVER),
         Ok(crate::BAND_LIMIT_MAX)
     );
-    let analysis = analyse(&random(32, 16, 3), &AnalysisRequest { alpha_min: 0.25, error: 1e-3 });
+    let analysis =
+        analyse(&random(32, 16, 3), &AnalysisRequest { alpha_min: 0.25, sheen_alpha_min: None, error: 1e-3 });
     let sharper = specular_level(&analysis, 0.001, 2);
     assert!(sharper.accuracy.rms_bound > 0.01, "{:?}", sharper.accuracy);
 }
@@ -174,7 +179,8 @@ fn irradiance_is_alpha_one() {
 
 #[test]
 fn analysis_survives_its_bytes_and_hostile_ones_do_not() {
-    let analysis = analyse(&sun(16, 8, 3), &AnalysisRequest { alpha_min: 0.5, error: 1e-2 });
+    let analysis =
+        analyse(&sun(16, 8, 3), &AnalysisRequest { alpha_min: 0.5, sheen_alpha_min: None, error: 1e-2 });
     let bytes = bytes_of(&analysis);
     assert_eq!(Analysis::from_bytes(&bytes, Cancel::NEVER), Ok(analysis));
     for length in 0..bytes.len().min(200) {
@@ -214,7 +220,7 @@ fn real_studio_matches_brute_force() {
         let level = specular_level(&analysis, alpha, 64);
         let (mut error, mut size) = (0.0, 0.0);
         for index in (0..6 * 64 * 64).step_by(997) {
-            let exact = reference_radiance(&map, alpha, texel_direction(64, index));
+            let exact = reference_radiance(&map, Lobe::Ggx { alpha }, texel_direction(64, index));
             for (value, exact) in level.cube.rgb[3 * index..].iter().zip(exact) {
                 error += (f64::from(*value) - exact).powi(2);
                 size += exact * exact;

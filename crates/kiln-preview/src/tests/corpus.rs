@@ -34,7 +34,11 @@ fn bake(build: &mut Build, name: &str, path: &Path) {
     let bytes = std::fs::read(path).expect("the corpus has it");
     let decoded = kiln_image::decode(&bytes, &Limits::default(), Cancel::NEVER).expect("it is sound");
     let panorama = Panorama::new(decoded.image).expect("it is twice as wide as high");
-    let request = AnalysisRequest { alpha_min: (1.0 / (SPECULAR_LEVELS - 1) as f64).powi(2), error: 1e-3 };
+    let request = AnalysisRequest {
+        alpha_min: (1.0 / (SPECULAR_LEVELS - 1) as f64).powi(2),
+        sheen_alpha_min: None,
+        error: 1e-3,
+    };
     let analysis = kiln_bake::analyse(&panorama, &request, Cancel::NEVER).expect(WANTED);
     let skybox = |size: usize| kiln_bake::skybox(&panorama, size, Cancel::NEVER).expect(WANTED);
     let mirror = skybox(SPECULAR_SIZE).swap_remove(0);
