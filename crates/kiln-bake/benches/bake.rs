@@ -35,12 +35,18 @@ fn main() {
     let error: f64 = args[2].parse().unwrap();
     let n = Cancel::NEVER;
     let bytes = std::fs::read(&file).unwrap();
-    let decoded = timed("decode", || kiln_image::decode(&bytes, &Limits::default(), n).unwrap());
+    let decoded = timed("decode", || decode(&bytes, &Limits::default(), n).unwrap());
     let p = Panorama::new(decoded.image).unwrap();
     println!("{}x{}", p.width(), p.height());
     let request = AnalysisRequest { alpha_min: 1.0 / 64.0, sheen_alpha_min: None, error };
     let a = timed("analyse", || analyse(&p, &request, n).unwrap());
     println!("L {}", a.band_limit());
+    if args.len() > 4 {
+        for _ in 0..20 {
+            analyse(&p, &request, n).unwrap();
+        }
+        return;
+    }
     let size: usize = args.get(3).map_or(256, |x| x.parse().unwrap());
     let count = size.ilog2();
     let (c0, w0) = (cpu_s(), Instant::now());
@@ -62,7 +68,7 @@ fn accuracy(error: f64, files: &[String]) {
     let n = Cancel::NEVER;
     for file in files {
         let bytes = std::fs::read(file).unwrap();
-        let decoded = kiln_image::decode(&bytes, &Limits::default(), n).unwrap();
+        let decoded = decode(&bytes, &Limits::default(), n).unwrap();
         let mut image = decoded.image;
         TexelPolicy::Repair.apply(&mut image, n).unwrap();
         let p = Panorama::new(image).unwrap();

@@ -9,8 +9,8 @@ use std::f64::consts::PI;
 /// Highest band limit [`analyse`] chooses: GGX of α = 1/256 to 1e-4. Beyond it memory, not time, is the limit
 /// (counted: about 0.9 GB while a map of all its degrees is made).
 pub const BAND_LIMIT_MAX: usize = 2047;
-/// Most texels that are convolved directly.
-pub const BRIGHT_MAX: usize = 64;
+/// Most texels that are convolved directly: a sun of 0.53° covers 28 texels of a panorama 4096 wide, 450 of the largest.
+pub const BRIGHT_MAX: usize = 512;
 /// Degrees kept of the whole environment, bright texels included, for [`crate::sh`].
 pub(crate) const LOW_BAND_LIMIT: usize = 8;
 
@@ -56,27 +56,50 @@ pub fn analyse(
     cancel: Cancel,
 ) -> Result<Analysis, Cancelled> {
     let (width, height) = (panorama.width(), panorama.height());
-    let low = kiln_sphere::analyse(width, height, panorama.rgb(), LOW_BAND_LIMIT, cancel)?;
     let mut rgb = Bulk::new(Vec::with_capacity(panorama.rgb().len()));
     for row in panorama.rgb().chunks_exact(width * 3) {
         cancel.check()?;
         rgb.extend_from_slice(row);
     }
-    let bright = take_brightest(width, &mut rgb, low.mean(), BRIGHT_MAX, cancel)?;
-    let dim_energy = energy(width, height, &rgb, cancel)?;
-    let variance = variance_of_rest(low.mean(), dim_energy, width, height, &bright);
-    let band_limit = choose_band_limit(request, low.mean(), variance, cancel)?;
+    let whole = sums(width, height, &rgb, cancel)?;
+    let bright = take_brightest(width, height, &mut rgb, &whole, cancel)?;
+    let rest = if bright.is_empty() { whole.clone() } else { sums(width, height, &rgb, cancel)? };
+    let band_limit = choose_band_limit(request, whole.mean(), rest.variance(), cancel)?;
     let dim = kiln_sphere::analyse(width, height, &rgb, band_limit, cancel)?;
+    let mut low = dim.truncated(LOW_BAND_LIMIT);
+    if !bright.is_empty() {
+        low.add(&analyse_bright(width, height, &bright, rgb, cancel)?);
+    }
     Ok(Analysis {
         width,
         height,
         error: request.error,
         dim,
-        dim_energy,
+        dim_energy: rest.energy,
         bright,
         low,
-        range: range(width, panorama.rgb(), cancel)?,
+        range: whole.range,
     })
+}
+
+/// Low harmonics of the bright texels' excess alone; `room` is as large as the panorama.
+fn analyse_bright(
+    width: usize,
+    height: usize,
+    bright: &[BrightTexel],
+    mut room: Bulk<Vec<f32>>,
+    cancel: Cancel,
+) -> Result<Harmonics, Cancelled> {
+    for row in room.chunks_exact_mut(width * 3) {
+        cancel.check()?;
+        row.fill(0.0);
+    }
+    for texel in bright {
+        for (value, excess) in room[3 * texel.index..].iter_mut().zip(texel.excess) {
+            *value = excess as f32;
+        }
+    }
+    kiln_sphere::analyse(width, height, &room, LOW_BAND_LIMIT, cancel)
 }
 
 impl Analysis {
@@ -91,22 +114,60 @@ impl Analysis {
     }
 }
 
-/// Mean of |dim − its mean|² over the sphere, summed over the channels.
-fn variance_of_rest(
-    mean: [f64; 3],
-    dim_energy: f64,
-    width: usize,
-    height: usize,
-    bright: &[BrightTexel],
-) -> f64 {
-    let mut dim_mean = mean;
-    for texel in bright {
-        let share = Patch::of_texel(width, height, texel.index).solid_angle_sr() / (4.0 * PI);
-        for (mean, excess) in dim_mean.iter_mut().zip(texel.excess) {
-            *mean -= share * excess;
+/// Integrals over the sphere of constant patches.
+#[derive(Clone)]
+pub(crate) struct Sums {
+    /// ∫ f dω.
+    flux: [f64; 3],
+    /// ∫ |f|² dω, summed over the channels.
+    pub(crate) energy: f64,
+    /// Least and greatest texel per channel.
+    range: [[f64; 2]; 3],
+}
+
+impl Sums {
+    pub(crate) fn mean(&self) -> [f64; 3] {
+        self.flux.map(|flux| flux / (4.0 * PI))
+    }
+
+    /// Mean of |f − its mean|² over the sphere, summed over the channels.
+    pub(crate) fn variance(&self) -> f64 {
+        (self.energy / (4.0 * PI) - square(self.mean())).max(0.0)
+    }
+
+    /// The same without `excess` of a texel of that value.
+    pub(crate) fn without(&self, value: [f64; 3], excess: [f64; 3], solid_angle_sr: f64) -> Sums {
+        let rest = std::array::from_fn(|i| value[i] - excess[i]);
+        Sums {
+            flux: std::array::from_fn(|i| self.flux[i] - solid_angle_sr * excess[i]),
+            energy: self.energy - solid_angle_sr * (square(value) - square(rest)),
+            range: self.range,
         }
     }
-    (dim_energy / (4.0 * PI) - square(dim_mean)).max(0.0)
+}
+
+fn sums(width: usize, height: usize, rgb: &[f32], cancel: Cancel) -> Result<Sums, Cancelled> {
+    let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
+    let (mut flux, mut energy) = ([0.0; 3], 0.0);
+    for (row, texels) in rgb.chunks_exact(width * 3).enumerate() {
+        cancel.check()?;
+        let solid_angle_sr = Patch::of_texel(width, height, row * width).solid_angle_sr();
+        let (mut sum, mut squares) = ([0.0; 3], [0.0; 3]);
+        for texel in texels.chunks_exact(3) {
+            for channel in 0..3 {
+                let value = f64::from(texel[channel]);
+                let [low, high] = &mut range[channel];
+                (*low, *high) = (low.min(value), high.max(value));
+                sum[channel] += value;
+                squares[channel] += value * value;
+            }
+        }
+        for (flux, sum) in flux.iter_mut().zip(sum) {
+            *flux += solid_angle_sr * sum;
+        }
+        energy += solid_angle_sr * squares.iter().sum::<f64>();
+    }
+    Ok(Sums { flux, energy, range })
 }
 
 fn square(rgb: [f64; 3]) -> f64 {
@@ -126,32 +187,21 @@ pub(crate) fn choose_band_limit(
     let sheen = request.sheen_alpha_min.map(|alpha| Lobe::Charlie { alpha });
     let mut band_limit = LOW_BAND_LIMIT;
     for lobe in [Lobe::Ggx { alpha: request.alpha_min }].into_iter().chain(sheen) {
-        let kappa = crate::prefilter::usable(lobe).kernel(BAND_LIMIT_MAX, cancel)?.kappa;
-        let last_needed = kappa.iter().rposition(|k| k.abs() > allowed || allowed.is_nan()).unwrap_or(0);
-        band_limit = band_limit.max(last_needed);
+        band_limit = band_limit.max(last_above(crate::prefilter::usable(lobe), allowed, cancel)?);
     }
     Ok(band_limit)
 }
 
-/// ∫ |f|² dω of constant patches, summed over the channels.
-fn energy(width: usize, height: usize, rgb: &[f32], cancel: Cancel) -> Result<f64, Cancelled> {
-    let row_energy = |(row, texels): (usize, &[f32])| {
-        cancel.check()?;
-        let solid_angle_sr = Patch::of_texel(width, height, row * width).solid_angle_sr();
-        Ok(solid_angle_sr * texels.iter().map(|&value| f64::from(value) * f64::from(value)).sum::<f64>())
-    };
-    rgb.chunks_exact(width * 3).enumerate().map(row_energy).sum()
-}
-
-fn range(width: usize, rgb: &[f32], cancel: Cancel) -> Result<[[f64; 2]; 3], Cancelled> {
-    let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
-    for row in rgb.chunks_exact(width * 3) {
-        cancel.check()?;
-        for texel in row.chunks_exact(3) {
-            for ([low, high], &value) in range.iter_mut().zip(texel) {
-                (*low, *high) = (low.min(value.into()), high.max(value.into()));
-            }
+/// The last degree at which a lobe's spectrum is above `allowed`, at most [`BAND_LIMIT_MAX`].
+fn last_above(lobe: Lobe, allowed: f64, cancel: Cancel) -> Result<usize, Cancelled> {
+    // A spectrum costs its length squared; one that stays below for half of it does not come back.
+    let mut limit = 255;
+    loop {
+        let kappa = lobe.kernel(limit, cancel)?.kappa;
+        let last = kappa.iter().rposition(|k| k.abs() > allowed || allowed.is_nan()).unwrap_or(0);
+        if limit == BAND_LIMIT_MAX || 2 * last < limit {
+            return Ok(last);
         }
+        limit = (2 * limit + 1).min(BAND_LIMIT_MAX);
     }
-    Ok(range)
 }

@@ -1,5 +1,6 @@
 //! The brightest texels leave the transform through their own door: each is convolved with the exact kernel.
 
+use crate::analysis::{BRIGHT_MAX, Sums};
 use crate::patch::{Cell, Node, Patch, is_below_horizon, is_on_horizon};
 use kiln_sphere::{Cancel, Cancelled, ZonalKernel};
 
@@ -14,27 +15,48 @@ pub(crate) struct BrightTexel {
 /// Texels below this many times the mean radiance stay with the transform: nothing there can ring visibly.
 const BRIGHTNESS_MIN: f64 = 16.0;
 
-/// Takes the up to `count` brightest texels (by their largest channel) down to the brightest that stays,
-/// keeping their hue; `rgb` is left with the rest.
+/// So much variance more than with as many texels as possible may stay: it takes a few degrees more to bring down, and a
+/// texel less to convolve for every texel of every map.
+const VARIANCE_KEPT: f64 = 1.5;
+
+/// Takes the brightest texels (by their largest channel) down to the brightest that stays, keeping their hue; `rgb` is
+/// left with the rest, of which and of their excess the texel is the exact sum.
+///
+/// As few as leave about the variance that [`BRIGHT_MAX`] of them would: a sun goes, a lit window stays.
 pub(crate) fn take_brightest(
     width: usize,
+    height: usize,
     rgb: &mut [f32],
-    mean: [f64; 3],
-    count: usize,
+    whole: &Sums,
     cancel: Cancel,
 ) -> Result<Vec<BrightTexel>, Cancelled> {
-    let limit = BRIGHTNESS_MIN * mean.iter().fold(0.0, |a: f64, &b| a.max(b));
+    let limit = BRIGHTNESS_MIN * whole.mean().iter().fold(0.0, |a: f64, &b| a.max(b));
     let texel_count = rgb.len() / 3;
-    let kept = count.min(texel_count - 1);
-    let top = brightest(width, rgb, kept + 1, cancel)?;
-    let taken = top[..kept].iter().take_while(|(value, _)| f64::from(*value) > limit).count();
-    let stays = if texel_count == 1 { 0.0 } else { top[taken].0 };
+    let most = BRIGHT_MAX.min(texel_count - 1);
+    let top = brightest(width, rgb, most + 1, cancel)?;
+    let stays = |taken: usize| if texel_count == 1 { 0.0 } else { top[taken].0 };
+    let most = top[..most].iter().take_while(|(value, _)| f64::from(*value) > limit).count();
+    let variance_without = |taken: usize| {
+        let take = |rest: Sums, &(value, index): &(f32, usize)| {
+            let texel = [0, 1, 2].map(|channel| f64::from(rgb[3 * index + channel]));
+            let excess = texel.map(|whole| whole * (1.0 - f64::from(stays(taken) / value)));
+            rest.without(texel, excess, Patch::of_texel(width, height, index).solid_angle_sr())
+        };
+        top[..taken].iter().fold(whole.clone(), take).variance()
+    };
+    let enough = VARIANCE_KEPT * variance_without(most);
+    let doubling = std::iter::successors(Some(1), |count| Some(2 * count)).take_while(|&count| count < most);
+    let taken = std::iter::once(0).chain(doubling).find(|&count| variance_without(count) <= enough);
+    let taken = taken.unwrap_or(most);
+    let stays = stays(taken);
     let take = |&(value, index): &(f32, usize)| {
         let texel = &mut rgb[3 * index..3 * index + 3];
         let excess = std::array::from_fn(|channel| {
             let whole = texel[channel];
-            texel[channel] = whole * (stays / value);
-            f64::from(whole) - f64::from(texel[channel])
+            // Both differences are exact: either part is at most twice the other (Sterbenz).
+            let excess = whole - whole * (stays / value);
+            texel[channel] = whole - excess;
+            f64::from(excess)
         });
         BrightTexel { index, excess }
     };

@@ -5,8 +5,8 @@ use crate::bright::{BrightSet, LANES};
 use kiln_image::Cube;
 use kiln_sphere::direction::cube_texel_centre;
 use kiln_sphere::{
-    Bulk, Cancel, Cancelled, CubeSolidAngles, Kernel, Lobe, Profile, ZonalKernel, cube_direction, simd,
-    synthesise_cube,
+    Bulk, Cancel, Cancelled, CubeSolidAngles, Interpolation, Kernel, Lobe, Profile, ZonalKernel,
+    cube_direction, simd, synthesise_cube,
 };
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -95,7 +95,8 @@ fn prefilter(
     let kernel = lobe.kernel(analysis.band_limit(), cancel)?;
     let truncation = Truncation::choose(analysis, &kernel, cancel)?;
     let kappa = &kernel.kappa[..=truncation.band_limit];
-    let mut values = synthesise_cube(&analysis.dim, kappa, face_size, cancel)?;
+    let interpolation = interpolation(analysis.error);
+    let mut values = synthesise_cube(&analysis.dim, kappa, face_size, interpolation, cancel)?;
     match lobe.profile(kernel.ln_norm) {
         Profile::Ggx(kernel) => add_bright(analysis, kernel, face_size, &mut values, cancel)?,
         Profile::Charlie(kernel) => add_bright(analysis, kernel, face_size, &mut values, cancel)?,
@@ -180,10 +181,19 @@ fn rule_error(error: f64) -> f64 {
     (0.05 * error).clamp(1e-9, 1e-4)
 }
 
+/// The cheapest that is little beside the error asked for.
+fn interpolation(error: f64) -> Interpolation {
+    if error >= 5e-4 { Interpolation::Coarse } else { Interpolation::Fine }
+}
+
 /// Relative error of evaluation apart from truncation: the window of the synthesis and rounding to `f32` (measured, not
 /// proved), and the bright texels' rules.
 fn evaluation_error(error: f64) -> f64 {
-    2e-7 + rule_error(error)
+    let interpolated = match interpolation(error) {
+        Interpolation::Coarse => 2e-5,
+        Interpolation::Fine => 2e-7,
+    };
+    interpolated + rule_error(error)
 }
 
 /// How many degrees a map takes and what the others could have added.

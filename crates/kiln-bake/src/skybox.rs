@@ -96,7 +96,7 @@ fn half_texel(cube: &Cube, solid_angles: &CubeSolidAngles, face: usize, y: usize
 /// Lines across a side face's piece between meridians.
 const LINES: usize = 2;
 /// Rays across a cap's piece between meridians; pieces are so many that a texel at the edge sees at least these.
-const RAYS: usize = 4;
+const RAYS: usize = 3;
 
 struct Sampler<'a> {
     panorama: &'a Panorama,

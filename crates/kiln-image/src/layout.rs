@@ -73,6 +73,7 @@ impl Image {
     ///
     /// # Panics
     /// Outside the image.
+    #[inline]
     pub fn texel(&self, x: usize, y: usize) -> [f32; 3] {
         assert!(x < self.width && y < self.height, "texel ({x}, {y}) of {} × {}", self.width, self.height);
         triple(&self.rgb, y * self.width + x)
@@ -101,16 +102,19 @@ impl Panorama {
     }
 
     /// Columns.
+    #[inline]
     pub fn width(&self) -> usize {
         self.0.width
     }
 
     /// Rows.
+    #[inline]
     pub fn height(&self) -> usize {
         self.0.height
     }
 
     /// `width · height · 3` values, row 0 at the top.
+    #[inline]
     pub fn rgb(&self) -> &[f32] {
         &self.0.rgb
     }
@@ -119,6 +123,7 @@ impl Panorama {
     ///
     /// # Panics
     /// Outside the image.
+    #[inline]
     pub fn texel(&self, x: usize, y: usize) -> [f32; 3] {
         self.0.texel(x, y)
     }

@@ -12,9 +12,10 @@
 //!    ∫ … dθ = (π/N) Σ_n is exact too. The ring count is free of H, and the two hemispheres share P̄_lm.
 
 use crate::cancel::{Bulk, Cancel, Cancelled};
-use crate::fft::{C64, Plan, bin, cis, even_fft_length, sinc};
+use crate::fft::{Batch, C64, Plan, SIGNALS, bin, cis, even_fft_length, sinc};
 use crate::harmonics::{Coefficient, Harmonics, coefficient_count};
-use crate::legendre::{BATCH, LANES, Order, RingBlock, add_products};
+use crate::legendre::{BATCH, LANES, Order, Padded, RingBlock, add_products, unpad};
+use crate::simd;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
@@ -39,19 +40,25 @@ pub fn analyse(
     let columns = Columns::new(height, band_limit);
     let stride = rows.len() / height;
     let mut orders = Bulk::new(vec![Vec::new(); band_limit + 1]);
-    orders.par_iter_mut().enumerate().try_for_each(|(m, order)| {
-        let weight =
-            cis(-PI * m as f64 / width as f64) * (2.0 * PI / width as f64 * sinc(m as f64 / width as f64));
-        let (frequency, conjugate) = alias(m, width);
-        let column: Vec<[C64; 3]> = (0..height)
-            .map(|row| {
-                let [r, g, b] = values(&rows[row * stride + frequency]);
-                [r, g, b].map(|z| if conjugate { z.conj() } else { z } * weight)
-            })
-            .collect();
-        *order = columns.project(m, &column, cancel)?;
-        Ok(())
-    })?;
+    orders.par_chunks_mut(SIGNALS).enumerate().try_for_each_init(
+        Room::default,
+        |room, (chunk, orders)| {
+            let first = chunk * SIGNALS;
+            let ms: [usize; SIGNALS] = std::array::from_fn(|signal| first + signal.min(orders.len() - 1));
+            let weights = ms.map(|m| {
+                let share = m as f64 / width as f64;
+                cis(-PI * share) * (2.0 * PI / width as f64 * sinc(share))
+            });
+            let aliases = ms.map(|m| alias(m, width));
+            let value = |row: usize, channel: usize, signal: usize| {
+                let (frequency, is_conjugate) = aliases[signal];
+                let coefficient = &rows[row * stride + frequency];
+                let z = C64::new(coefficient[2 * channel], coefficient[2 * channel + 1]);
+                (if is_conjugate { z.conj() } else { z }) * weights[signal]
+            };
+            columns.project(ms, value, room, orders, cancel)
+        },
+    )?;
     drop(spectra);
     Harmonics::from_orders(band_limit, &mut orders, cancel)
 }
@@ -83,26 +90,38 @@ fn row_spectra(
     cancel: Cancel,
 ) -> Result<Bulk<Vec<Coefficient>>, Cancelled> {
     let stride = spectrum_length(width, band_limit);
-    let fft = Plan::new(width).forward;
+    let fft = Plan::new(width);
     // Plain zeros come from the system as they are touched, in the loop; zeros of another type would be written here,
     // all 200 MB of them.
     let mut spectra = Bulk::new(vec![[0.0; 6]; height * stride]);
-    spectra.par_chunks_mut(stride).zip(rgb.par_chunks(width * 3)).try_for_each_init(
-        || (vec![C64::default(); width], vec![C64::default(); width]),
-        |(red_green, blue), (out, row)| {
+    spectra.par_chunks_mut(stride * ROWS).zip(rgb.par_chunks(width * 3 * ROWS)).try_for_each_init(
+        || (vec![Batch::default(); width], Vec::new()),
+        |(signals, room), (out, texels)| {
             cancel.check()?;
-            for (j, texel) in row.chunks_exact(3).enumerate() {
-                red_green[j] = C64::new(f64::from(texel[0]), f64::from(texel[1]));
-                blue[j] = C64::new(f64::from(texel[2]), 0.0);
+            if texels.iter().all(|&value| value == 0.0) {
+                // As the spectra are already: a few bright texels alone cost little.
+                return Ok(());
             }
-            fft.process(red_green);
-            fft.process(blue);
-            for (m, out) in out.iter_mut().enumerate() {
-                // Two real rows in one complex transform: their spectra are its Hermitian parts.
-                let (z, mirrored) = (red_green[m], red_green[bin(-(m as isize), width)].conj());
-                let difference = (z - mirrored) * 0.5;
-                let red = (z + mirrored) * 0.5;
-                *out = [red.re, red.im, difference.im, -difference.re, blue[m].re, blue[m].im];
+            for channel in 0..3 {
+                cancel.check()?;
+                for (row, texels) in texels.chunks_exact(width * 3).enumerate() {
+                    let values = texels[channel..].iter().step_by(3);
+                    for (signal, &value) in signals.iter_mut().zip(values) {
+                        let parts = if row % 2 == 0 { &mut signal.re } else { &mut signal.im };
+                        parts[row / 2] = f64::from(value);
+                    }
+                }
+                fft.forward(signals, room);
+                for (row, out) in out.chunks_exact_mut(stride).enumerate() {
+                    for (m, out) in out.iter_mut().enumerate() {
+                        // Two real rows in one complex transform: their spectra are its Hermitian parts.
+                        let z = signals[m].get(row / 2);
+                        let mirrored = signals[bin(-(m as isize), width)].get(row / 2).conj();
+                        let (sum, difference) = ((z + mirrored) * 0.5, (z - mirrored) * 0.5);
+                        let value = if row % 2 == 0 { sum } else { C64::new(difference.im, -difference.re) };
+                        out[2 * channel..2 * channel + 2].copy_from_slice(&[value.re, value.im]);
+                    }
+                }
             }
             Ok(())
         },
@@ -110,9 +129,15 @@ fn row_spectra(
     Ok(spectra)
 }
 
-/// The channels of a coefficient as complex numbers.
-fn values(&[a, b, c, d, e, f]: &Coefficient) -> [C64; 3] {
-    [C64::new(a, b), C64::new(c, d), C64::new(e, f)]
+/// Rows transformed together: two real ones make a complex signal.
+const ROWS: usize = 2 * SIGNALS;
+
+/// Buffers of one thread.
+#[derive(Default)]
+struct Room {
+    steps: Vec<Batch>,
+    rings: Vec<Batch>,
+    fft: Vec<Batch>,
 }
 
 /// What all columns of one panorama share.
@@ -147,78 +172,106 @@ impl Columns {
         }
     }
 
-    /// a_lm for l = m … L from the column's F_m, one value per row and channel.
-    fn project(&self, m: usize, column: &[[C64; 3]], cancel: Cancel) -> Result<Vec<Coefficient>, Cancelled> {
+    /// a_lm for l = m … L of up to four orders from their columns F_m: `value(row, channel, signal)`.
+    fn project(
+        &self,
+        ms: [usize; SIGNALS],
+        value: impl Fn(usize, usize, usize) -> C64,
+        room: &mut Room,
+        orders: &mut [Vec<Coefficient>],
+        cancel: Cancel,
+    ) -> Result<(), Cancelled> {
         let half = self.ring_count / 2;
-        let mut even = vec![[0.0; 6]; half.next_multiple_of(LANES)];
-        let mut odd = even.clone();
+        let mut parities = [(); SIGNALS].map(|()| {
+            let zeros = vec![[0.0; 8]; half.next_multiple_of(LANES)];
+            [zeros.clone(), zeros]
+        });
         for channel in 0..3 {
             cancel.check()?;
-            let rings = self.on_rings(m, column, channel);
-            for n in 0..half {
-                let (north, south) = (rings[n], rings[self.ring_count - 1 - n]);
-                let (sum, difference) = (north + south, north - south);
-                even[n][2 * channel..2 * channel + 2].copy_from_slice(&[sum.re, sum.im]);
-                odd[n][2 * channel..2 * channel + 2].copy_from_slice(&[difference.re, difference.im]);
+            self.to_rings(ms, |row, signal| value(row, channel, signal), room);
+            let place = 2 * channel..2 * channel + 2;
+            for (signal, [even, odd]) in parities.iter_mut().enumerate() {
+                for n in 0..half {
+                    let (north, south) = (room.rings[n], room.rings[self.ring_count - 1 - n]);
+                    let (north, south) = (north.get(signal), south.get(signal));
+                    let (sum, difference) = (north + south, north - south);
+                    even[n][place.clone()].copy_from_slice(&[sum.re, sum.im]);
+                    odd[n][place.clone()].copy_from_slice(&[difference.re, difference.im]);
+                }
             }
         }
-        self.integrate(m, &[even, odd], cancel)
+        for (signal, order) in orders.iter_mut().enumerate() {
+            *order = self.integrate(ms[signal], &parities[signal], cancel)?;
+        }
+        Ok(())
     }
 
-    /// F_m(θ) sin θ, band-limited, on the rings.
-    fn on_rings(&self, m: usize, column: &[[C64; 3]], channel: usize) -> Vec<C64> {
-        let sign = if m.is_multiple_of(2) { -1.0 } else { 1.0 };
+    /// F_m(θ) sin θ of four orders, band-limited, on the rings: `room.rings`, north to south.
+    fn to_rings(&self, ms: [usize; SIGNALS], value: impl Fn(usize, usize) -> C64, room: &mut Room) {
         let period = 2 * self.height;
-        let mut steps = vec![C64::default(); period];
-        for (row, value) in column.iter().enumerate() {
+        room.steps.resize(period, Batch::default());
+        for (signal, m) in ms.into_iter().enumerate() {
             // sin θ changes sign behind the pole, and so must the step function where the product is even.
-            steps[row] = value[channel];
-            steps[period - 1 - row] = value[channel] * sign;
+            let sign = if m.is_multiple_of(2) { -1.0 } else { 1.0 };
+            for row in 0..self.height {
+                let step = value(row, signal);
+                room.steps[row].set(signal, step);
+                room.steps[period - 1 - row].set(signal, step * sign);
+            }
         }
-        self.patches.forward.process(&mut steps);
+        self.patches.forward(&mut room.steps, &mut room.fft);
         let step_at = |k: isize| {
             let factor = self.step_factor[k.unsigned_abs()];
-            steps[bin(k, period)] * if k < 0 { factor.conj() } else { factor }
+            room.steps[bin(k, period)] * if k < 0 { factor.conj() } else { factor }
         };
-        let mut rings = vec![C64::default(); 2 * self.ring_count];
+        room.rings.clear();
+        room.rings.resize(2 * self.ring_count, Batch::default());
         let limit = self.band_limit as isize;
         for k in -limit..=limit {
-            let shift = self.ring_shift[k.unsigned_abs()];
-            let times_sin = (step_at(k - 1) - step_at(k + 1)) * C64::new(0.0, -0.5);
-            rings[bin(k, 2 * self.ring_count)] = times_sin * if k < 0 { shift.conj() } else { shift };
+            let shift = self.ring_shift[k.unsigned_abs()] * C64::new(0.0, -0.5);
+            let shift = if k < 0 { -shift.conj() } else { shift };
+            room.rings[bin(k, 2 * self.ring_count)] = (step_at(k - 1) - step_at(k + 1)) * shift;
         }
-        self.rings.inverse.process(&mut rings);
-        rings.truncate(self.ring_count);
-        rings
+        self.rings.inverse(&mut room.rings, &mut room.fft);
     }
 
     /// (π/N) Σ_n P̄_lm(θ_n) g(θ_n) over both hemispheres; P̄_lm is even about the equator where l − m is.
     fn integrate(
         &self,
         m: usize,
-        parities: &[Vec<Coefficient>; 2],
+        parities: &[Vec<Padded>; 2],
         cancel: Cancel,
     ) -> Result<Vec<Coefficient>, Cancelled> {
         let order = Order::new(m, self.band_limit);
         let count = self.band_limit + 1 - m;
-        let mut sums = vec![[0.0; 6]; count.next_multiple_of(BATCH)];
+        let mut sums = vec![[0.0; 8]; count.next_multiple_of(BATCH)];
         for (index, block) in self.blocks.iter().enumerate() {
             if block.is_negligible(m, self.band_limit) {
                 continue;
             }
             cancel.check()?;
             let first = index * LANES;
-            let rings: [&[Coefficient; LANES]; 2] = std::array::from_fn(|parity| {
+            let rings: [&[Padded; LANES]; 2] = std::array::from_fn(|parity| {
                 parities[parity][first..first + LANES].try_into().expect("padded to whole blocks")
             });
-            order.for_each_batch(block, |first, legendre| {
-                for (index, (sum, p)) in sums[first..first + BATCH].iter_mut().zip(legendre).enumerate() {
-                    *sum = add_products(*sum, p, rings[index & 1]);
-                }
-            });
+            simd::dispatch(
+                #[inline(always)]
+                || {
+                    order.for_each_batch(
+                        block,
+                        #[inline(always)]
+                        |first, legendre| {
+                            let sums = &mut sums[first..first + BATCH];
+                            for (index, (sum, p)) in sums.iter_mut().zip(legendre).enumerate() {
+                                *sum = add_products(*sum, p, rings[index & 1]);
+                            }
+                        },
+                    );
+                },
+            );
         }
         let weight = PI / self.ring_count as f64;
-        Ok(sums[..count].iter().map(|sum| sum.map(|part| part * weight)).collect())
+        Ok(sums[..count].iter().map(|sum| unpad(sum.map(|part| part * weight))).collect())
     }
 }
 

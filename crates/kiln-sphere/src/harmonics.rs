@@ -45,6 +45,32 @@ impl Harmonics {
         (coefficients.len() == coefficient_count(band_limit)).then_some(Self { band_limit, coefficients })
     }
 
+    /// The degrees up to `band_limit`; zeros where there are none.
+    pub fn truncated(&self, band_limit: usize) -> Self {
+        let mut result = Self::zero(band_limit);
+        let mut start = 0;
+        for m in 0..=band_limit {
+            let count = band_limit + 1 - m;
+            if m <= self.band_limit {
+                let order = self.order(m);
+                let kept = count.min(order.len());
+                result.coefficients[start..start + kept].copy_from_slice(&order[..kept]);
+            }
+            start += count;
+        }
+        result
+    }
+
+    /// Adds a function of the same band limit. Panics if it has another.
+    pub fn add(&mut self, other: &Harmonics) {
+        assert_eq!(self.band_limit, other.band_limit, "sums need equal band limits");
+        for (sum, value) in self.coefficients.iter_mut().zip(other.coefficients.iter()) {
+            for (sum, value) in sum.iter_mut().zip(value) {
+                *sum += value;
+            }
+        }
+    }
+
     /// Highest degree kept.
     pub fn band_limit(&self) -> usize {
         self.band_limit

@@ -7,6 +7,7 @@
 
 use crate::cancel::{Cancel, Cancelled};
 use crate::quadrature::gauss_legendre;
+use crate::simd;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Spectrum of a kernel, normalised to κ_0 = 1, with what error bounds need of it.
@@ -167,7 +168,10 @@ fn spectrum(
         cancel.check()?;
         let one_minus_x = std::array::from_fn(|lane| nodes.get(lane).map_or(0.0, |node| node.one_minus_x));
         let mass = std::array::from_fn(|lane| masses.get(lane).map_or(0.0, |mass| mass / total));
-        add_legendre_moments(&mut kappa, &one_minus_x, &mass);
+        simd::dispatch(
+            #[inline(always)]
+            || add_legendre_moments(&mut kappa, &one_minus_x, &mass),
+        );
     }
     kappa[0] = 1.0;
     Ok(Kernel { kappa, ln_norm, energy: mean_of_kernel })
@@ -175,18 +179,20 @@ fn spectrum(
 
 /// κ_l += Σ mass · P_l(x), by Bonnet's recursion in u = 1 − x for the differences δ_l = P_l − P_{l−1}:
 /// δ_{l+1} = (l δ_l − (2l + 1) u P_l)/(l + 1), which stays exact near x = 1.
+#[inline(always)]
 fn add_legendre_moments(kappa: &mut [f64], one_minus_x: &[f64; LANES], mass: &[f64; LANES]) {
     let (mut value, mut difference) = ([1.0; LANES], [0.0; LANES]);
     for (l, kappa) in kappa.iter_mut().enumerate() {
         let inverse = 1.0 / (l + 1) as f64;
         let (keep, turn) = (l as f64 * inverse, (2 * l + 1) as f64 * inverse);
-        let mut sum = 0.0;
+        let mut products = [0.0; LANES];
         for lane in 0..LANES {
-            sum += mass[lane] * value[lane];
+            products[lane] = mass[lane] * value[lane];
             difference[lane] = keep * difference[lane] - turn * (one_minus_x[lane] * value[lane]);
             value[lane] += difference[lane];
         }
-        *kappa += sum;
+        let pairs: [f64; LANES / 2] = std::array::from_fn(|lane| products[lane] + products[lane + LANES / 2]);
+        *kappa += (pairs[0] + pairs[2]) + (pairs[1] + pairs[3]);
     }
 }
 

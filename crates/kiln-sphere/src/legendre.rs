@@ -113,15 +113,19 @@ impl Order {
     ) {
         let mut batch = [[0.0; LANES]; BATCH];
         let mut is_empty = true;
-        self.for_each_degree(rings, |offset, values| {
-            batch[offset % BATCH] = *values;
-            is_empty = false;
-            if offset % BATCH == BATCH - 1 {
-                visit(offset + 1 - BATCH, &batch);
-                batch = [[0.0; LANES]; BATCH];
-                is_empty = true;
-            }
-        });
+        self.for_each_degree(
+            rings,
+            #[inline(always)]
+            |offset, values| {
+                batch[offset % BATCH] = *values;
+                is_empty = false;
+                if offset % BATCH == BATCH - 1 {
+                    visit(offset + 1 - BATCH, &batch);
+                    batch = [[0.0; LANES]; BATCH];
+                    is_empty = true;
+                }
+            },
+        );
         if !is_empty {
             visit(self.steps.len() / BATCH * BATCH, &batch);
         }
@@ -137,20 +141,34 @@ fn advance(&[a, b]: &[f64; 2], x: &[f64; LANES], value: &mut [f64; LANES], previ
     }
 }
 
+/// Six numbers and two of no meaning, a whole number of vectors.
+pub(crate) type Padded = [f64; 8];
+
+/// Fills a coefficient up.
+#[inline(always)]
+pub(crate) fn pad([a, b, c, d, e, f]: [f64; 6]) -> Padded {
+    [a, b, c, d, e, f, 0.0, 0.0]
+}
+
+/// The coefficient again.
+#[inline(always)]
+pub(crate) fn unpad([a, b, c, d, e, f, ..]: Padded) -> [f64; 6] {
+    [a, b, c, d, e, f]
+}
+
 /// sum + Σ_j factors[j] · rows[j], j ascending.
 #[inline(always)]
 pub(crate) fn add_products<const N: usize>(
-    sum: [f64; 6],
+    mut sum: Padded,
     factors: &[f64; N],
-    rows: &[[f64; 6]; N],
-) -> [f64; 6] {
-    let [mut a, mut b, mut c] = [[sum[0], sum[1]], [sum[2], sum[3]], [sum[4], sum[5]]];
+    rows: &[Padded; N],
+) -> Padded {
     for (&factor, row) in factors.iter().zip(rows) {
-        a = [a[0] + factor * row[0], a[1] + factor * row[1]];
-        b = [b[0] + factor * row[2], b[1] + factor * row[3]];
-        c = [c[0] + factor * row[4], c[1] + factor * row[5]];
+        for (sum, value) in sum.iter_mut().zip(row) {
+            *sum += factor * value;
+        }
     }
-    [a[0], a[1], b[0], b[1], c[0], c[1]]
+    sum
 }
 
 fn rescale(value: &mut [f64; LANES], previous: &mut [f64; LANES], exponent: &mut [u32; LANES]) {

@@ -43,5 +43,5 @@ pub use direction::{
 pub use harmonics::{Harmonics, coefficient_count};
 pub use kernel::{Kernel, ggx_kernel_at, kernel_charlie, kernel_ggx, kernel_lambert};
 pub use lobe::{CharlieProfile, GgxProfile, Lobe, Profile, ZonalKernel};
-pub use synthesis::{evaluate, synthesise_cube, synthesise_cube_bytes};
+pub use synthesis::{Interpolation, evaluate, synthesise_cube, synthesise_cube_bytes};
 pub use world::{real_harmonics, world_coefficients};

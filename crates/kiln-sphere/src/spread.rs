@@ -8,24 +8,23 @@ use crate::cancel::{Cancel, Cancelled};
 use crate::quadrature::gauss_legendre;
 use std::f64::consts::PI;
 
-/// Grid points a position is interpolated from, per dimension.
-pub(crate) const WIDTH: usize = 10;
 /// Grid points per highest frequency's two samples.
 pub(crate) const OVERSAMPLING: f64 = 1.5;
 /// Coefficients of each polynomial; with 14 they follow the window to 1e-10.
 const COEFFICIENTS: usize = 14;
 
-/// The window as one polynomial per grid interval, and what interpolation does to each frequency.
-pub(crate) struct Window {
-    /// `powers[d][j]`: coefficient of y^d in the weight of the j-th of the [`WIDTH`] grid points.
+/// The window as one polynomial per grid interval, and what interpolation does to each frequency. A position is
+/// interpolated from `WIDTH` grid points per dimension, to some 10^(1 − WIDTH · 0.8) of the function.
+pub(crate) struct Window<const WIDTH: usize> {
+    /// `powers[d][j]`: coefficient of y^d in the weight of the j-th grid point.
     powers: [[f64; WIDTH]; COEFFICIENTS],
 }
 
-impl Window {
+impl<const WIDTH: usize> Window<WIDTH> {
     pub(crate) fn new() -> Self {
         let mut powers = [[0.0; WIDTH]; COEFFICIENTS];
         for j in 0..WIDTH {
-            let polynomial = interpolate(|y| semicircle(interval_position(j, y)));
+            let polynomial = interpolate(|y| semicircle::<WIDTH>(interval_position::<WIDTH>(j, y)));
             for (row, coefficient) in powers.iter_mut().zip(polynomial) {
                 row[j] = coefficient;
             }
@@ -34,7 +33,7 @@ impl Window {
     }
 
     /// First grid point (may be negative) and weights for the position `x`, in units of the grid spacing.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn weights(&self, x: f64) -> (isize, [f64; WIDTH]) {
         let cell = x.floor();
         let y = 2.0 * (x - cell) - 1.0;
@@ -61,7 +60,7 @@ impl Window {
             // x = sin(πy/2) removes the root at the window's ends.
             let term = |&(y, weight): &(f64, f64)| {
                 let (sin, cos) = libm::sincos(0.5 * PI * y);
-                weight * 0.5 * PI * cos * half * semicircle(sin) * libm::cos(omega * half * sin)
+                weight * 0.5 * PI * cos * half * semicircle::<WIDTH>(sin) * libm::cos(omega * half * sin)
             };
             rule.iter().map(term).sum()
         };
@@ -69,14 +68,14 @@ impl Window {
     }
 }
 
-fn semicircle(x: f64) -> f64 {
+fn semicircle<const WIDTH: usize>(x: f64) -> f64 {
     let beta = 0.976 * PI * WIDTH as f64 * (1.0 - 0.5 / OVERSAMPLING);
     let inside = 1.0 - x * x;
     if inside <= 0.0 { libm::exp(-beta) } else { libm::exp(beta * (inside.sqrt() - 1.0)) }
 }
 
 /// Place in [−1, 1] of the window, seen from the j-th grid point, for y in [−1, 1] across the grid interval.
-fn interval_position(j: usize, y: f64) -> f64 {
+fn interval_position<const WIDTH: usize>(j: usize, y: f64) -> f64 {
     let half = WIDTH as f64 / 2.0;
     (half - 0.5 - j as f64 + 0.5 * y) / half
 }
