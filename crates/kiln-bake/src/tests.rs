@@ -1,6 +1,9 @@
 //! The recipes against closed forms, symmetries and brute force.
 
 mod cancelled_step_ends_soon;
+mod dering;
 mod environments;
 mod recipes;
+mod sun;
+mod tables;
 mod transform;
