@@ -7,7 +7,7 @@
 
 use crate::patch::Patch;
 use kiln_image::{Image, Panorama};
-use kiln_sphere::{Cancel, Cancelled};
+use kiln_sphere::{Cancel, Cancelled, panorama_direction};
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
@@ -176,7 +176,8 @@ impl<'a> Sphere<'a> {
     }
 
     fn direction(&self, index: usize) -> [f64; 3] {
-        self.patch(index).nodes(1)[0].direction
+        let at = |index: usize, count: usize| (index as f64 + 0.5) / count as f64;
+        panorama_direction(at(index % self.width, self.width), at(index / self.width, self.height))
     }
 
     /// Luminance and index of the brightest texel, of equal ones the first; `None` if all is black.

@@ -13,8 +13,9 @@ const ALPHA_MIRROR: f64 = 1e-7;
 pub enum Precision {
     /// 1e-9 of every value, at some milliseconds each.
     Full,
-    /// Good enough for a table of `f32`, at some 10 microseconds a value: 1e-5 for GGX everywhere; for sheen from roughness
-    /// 0.05 on 1e-7 clamped, and unclamped (where it exceeds 1) 5e-5 from n·v = 0.001 on, 5e-4 below.
+    /// Good enough for a table of `f32`, at some 10 microseconds a value: 5e-6 for GGX, 3e-5 where n·v and α vanish
+    /// together; for sheen from roughness 0.05 on 1e-7 clamped, and unclamped (where it exceeds 1) 5e-5 from
+    /// n·v = 0.001 on, 5e-4 below.
     Table,
 }
 

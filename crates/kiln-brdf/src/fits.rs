@@ -4,6 +4,9 @@ use crate::dfg::{Precision, dfg};
 use crate::lobes::Masking;
 
 /// [scale, bias] of Karis' fit for mobile (Karis 2014, "Physically Based Shading on Mobile").
+///
+/// RMS (worst) error over [0, 1]² of a dielectric's reflectance: 0.029 (0.24) against [`Masking::SchlickIbl`], for which it
+/// was made, 0.023 (0.084) against [`Masking::SmithCorrelated`]; of scale 0.070 (0.18) and 0.13 (0.46).
 pub fn fit_karis_mobile(n_dot_v: f64, perceptual_roughness: f64) -> [f64; 2] {
     let r = |slope: f64, offset: f64| perceptual_roughness * slope + offset;
     let (x, y, z, w) = (r(-1.0, 1.0), r(-0.0275, 0.0425), r(-0.572, 1.04), r(0.022, -0.04));
@@ -13,6 +16,9 @@ pub fn fit_karis_mobile(n_dot_v: f64, perceptual_roughness: f64) -> [f64; 2] {
 
 /// [scale, bias] of Lazarov's fit (Lazarov 2013, "Getting More Physical in Call of Duty: Black Ops II"), gloss read as
 /// 1 − perceptual roughness, as its ports do (the game's gloss was a Blinn–Phong exponent 2^(13 gloss)).
+///
+/// RMS (worst) error over [0, 1]² of a dielectric's reflectance: 0.032 (0.45) against [`Masking::SchlickIbl`], 0.051 (0.46)
+/// against [`Masking::SmithCorrelated`]; of scale 0.19 (0.50) and 0.14 (0.49).
 pub fn fit_lazarov(n_dot_v: f64, perceptual_roughness: f64) -> [f64; 2] {
     let gloss = 1.0 - perceptual_roughness;
     let t = |slope: f64, offset: f64| gloss * slope + offset;

@@ -1,6 +1,6 @@
 //! Directional albedo of the sheen lobe.
 
-use crate::circles::{Lobe, integrate};
+use crate::circles::{Lobe, Rule, integrate};
 use crate::dfg::{Precision, bring_into};
 use std::f64::consts::PI;
 
@@ -26,6 +26,15 @@ pub fn sheen_albedo(
     perceptual_roughness: f64,
     precision: Precision,
 ) -> f64 {
+    integrate_sheen(visibility, n_dot_v, perceptual_roughness, precision.rule())
+}
+
+pub(crate) fn integrate_sheen(
+    visibility: SheenVisibility,
+    n_dot_v: f64,
+    perceptual_roughness: f64,
+    rule: &Rule,
+) -> f64 {
     let n_dot_v = bring_into(n_dot_v, 0.0);
     let roughness = bring_into(perceptual_roughness, ROUGHNESS_MIN);
     let inverse_alpha = 1.0 / (roughness * roughness);
@@ -40,5 +49,5 @@ pub fn sheen_albedo(
         scattered: |n_dot_l: f64| n_dot_l * if is_clamped { v(n_dot_l).min(1.0) } else { v(n_dot_l) },
         kink: (is_clamped && kink > 0.0).then_some(kink),
     };
-    integrate(n_dot_v, &lobe, precision.rule()).iter().sum()
+    integrate(n_dot_v, &lobe, rule).iter().sum()
 }

@@ -2,9 +2,10 @@
 
 use super::cancelled_step_ends_soon::check;
 use super::environments::{analyse, check_within, panorama, random, sun};
+use crate::patch::Patch;
 use crate::{AnalysisRequest, Cancel, Deringed, ShCoefficients, dering, sh};
 use kiln_image::Panorama;
-use kiln_sphere::panorama_direction;
+use kiln_sphere::{panorama_direction, real_harmonics};
 use std::f64::consts::PI;
 
 const REQUEST: AnalysisRequest = AnalysisRequest { alpha_min: 1.0, error: 1e-2 };
@@ -102,25 +103,52 @@ fn black_light_and_negative_light_need_no_window() {
     }
 }
 
-#[test]
-fn order_eight_reproduces_a_polynomial_of_degree_eight() {
-    // A coarse map's low degrees are those of the map itself: compare with brute-force sums over its patches.
-    let map = random(12, 6, 8);
-    let analysis = analyse(&map, &REQUEST);
-    let eight = sh(&analysis, 8);
-    assert_eq!(eight.coefficients.len(), 81);
-    assert_eq!(sh(&analysis, 9).order, 8, "more is cut");
-    for order in [0, 1, 5] {
-        assert_eq!(sh(&analysis, order).coefficients.len(), (order + 1) * (order + 1));
-        for (low, high) in sh(&analysis, order).coefficients.iter().zip(&eight.coefficients) {
-            for channel in 0..3 {
-                check_within("degree", low[channel], high[channel], 1e-11);
+/// ∫ f Y_lm dω over constant patches, each by a product Gauss rule.
+fn brute_force(map: &Panorama, order: usize, nodes: usize) -> Vec<[f64; 3]> {
+    let mut sum = vec![[0.0; 3]; (order + 1) * (order + 1)];
+    for index in 0..map.width() * map.height() {
+        let texel = map.texel(index % map.width(), index / map.width());
+        for node in Patch::of_texel(map.width(), map.height(), index).nodes(nodes) {
+            for (sum, basis) in sum.iter_mut().zip(real_harmonics(node.direction, order)) {
+                for channel in 0..3 {
+                    sum[channel] += f64::from(texel[channel]) * basis * node.solid_angle_sr;
+                }
             }
         }
     }
+    sum
+}
+
+/// Largest difference of two sets of coefficients.
+fn difference(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let pairs = a.as_flattened().iter().zip(b.as_flattened());
+    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn every_order_matches_brute_force_over_the_patches() {
+    let map = random(12, 6, 8);
+    let analysis = analyse(&map, &REQUEST);
+    for order in 0..=8 {
+        let exact = brute_force(&map, order, 8);
+        let error = difference(&sh(&analysis, order).coefficients, &exact);
+        assert!(error <= 1e-9, "order {order}: {error}");
+    }
+    assert!(
+        difference(&sh(&analysis, 8).coefficients, &brute_force(&map, 8, 1)) > 1e-3,
+        "points are no patches"
+    );
+    assert_eq!(sh(&analysis, 9).order, 8, "more is cut");
+}
+
+#[test]
+fn irradiance_scales_each_degree_by_lamberts_spectrum() {
+    let radiance = radiance(&random(12, 6, 8), 8);
     let lambert = [1.0, 2.0 / 3.0, 0.25, 0.0, -1.0 / 24.0, 0.0, 1.0 / 64.0, 0.0, -1.0 / 128.0];
+    let irradiance = radiance.to_irradiance();
     for (index, (radiance, irradiance)) in
-        eight.coefficients.iter().zip(eight.to_irradiance().coefficients).enumerate()
+        radiance.coefficients.iter().zip(irradiance.coefficients).enumerate()
     {
         check_within("E/π", irradiance[1], radiance[1] * lambert[index.isqrt()], 1e-12);
     }

@@ -107,3 +107,15 @@ fn tables_of_one_row_or_none_are_legal() {
         }
     }
 }
+
+#[test]
+fn equal_tables_for_any_number_of_threads() {
+    let kind = Table::SheenAlbedo(SheenVisibility::Clamped);
+    let one = made(kind, TableAxes::Graded, 16);
+    for threads in [1, 2, 7] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        let bits = |values: Vec<f32>| values.into_iter().map(f32::to_bits).collect::<Vec<_>>();
+        assert_eq!(bits(pool.install(|| made(kind, TableAxes::Graded, 16))), bits(one.clone()), "{threads}");
+    }
+    assert!(made(kind, TableAxes::Uniform, 16) != one, "the axes matter");
+}
