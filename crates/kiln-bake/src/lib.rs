@@ -1,7 +1,7 @@
 //! Recipes of image-based lighting: an environment and a quality in, maps with their error out.
 //!
 //! Start at [`analyse`], which turns a panorama into an [`Analysis`] once; [`specular_level`], [`irradiance`]
-//! and [`sh`] read it. [`skybox`] and [`dfg_table`] need no analysis. [`encode_level`] makes texel bytes.
+//! and [`sh`] read it. [`skybox`] and [`table`] need no analysis. [`encode_level`] makes texel bytes.
 //!
 //! A prefiltered map is the environment convolved with its lobe (N = V = R), done on spherical harmonics with
 //! texels as constant patches; the brightest texels are convolved directly, so a sun cannot ring. There are no
@@ -20,6 +20,7 @@
 mod analysis;
 mod bright;
 mod bytes;
+mod dering;
 mod encode;
 mod measure;
 pub mod memory;
@@ -28,6 +29,7 @@ mod prefilter;
 mod reference;
 mod sh;
 mod skybox;
+mod sun;
 mod tables;
 #[cfg(test)]
 mod tests;
@@ -36,10 +38,12 @@ pub use kiln_sphere::{Bulk, Cancel, Cancelled, Lobe};
 
 pub use analysis::{Analysis, AnalysisRequest, BAND_LIMIT_MAX, BRIGHT_MAX, analyse};
 pub use bytes::BakeError;
+pub use dering::{Deringed, dering};
 pub use encode::{EncodedLevel, TexelFormat, encode_level, scale_log2};
 pub use measure::{BruteForce, Measured};
 pub use prefilter::{ALPHA_MIN, Accuracy, Prefiltered, irradiance, sheen_level, specular_level};
 pub use reference::reference_radiance;
 pub use sh::{ShCoefficients, irradiance_sh, sh};
 pub use skybox::skybox;
-pub use tables::{dfg_table, roughness_of_level};
+pub use sun::{FluxAccount, NoSun, Sun, SunExtraction, SunRequest, extract_sun};
+pub use tables::{TABLE_SIZE, Table, TableAxes, dfg_table, roughness_of_level, table, table_error};

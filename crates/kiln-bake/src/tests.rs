@@ -1,7 +1,10 @@
 //! The recipes against closed forms, symmetries and brute force.
 
 mod cancelled_step_ends_soon;
+mod dering;
 mod environments;
 mod measure;
 mod recipes;
+mod sun;
+mod tables;
 mod transform;

@@ -39,6 +39,67 @@ pub(crate) fn schlick_weight(v_dot_h: f64) -> f64 {
     x2 * x2 * x
 }
 
+/// How a microfacet lobe masks and shadows: the term G of V = G / (4 n·l n·v).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Masking {
+    /// Height-correlated Smith (Heitz 2014, eq. 99): what glTF's renderers and Filament use.
+    SmithCorrelated,
+    /// Separable Smith, G_1(n·l) G_1(n·v) (Walter et al. 2007, eq. 34).
+    SmithSeparable,
+    /// Schlick's rational G_1 = x / (x (1 − k) + k) with k = α/2: the split-sum table of Karis 2013 and of the tutorials.
+    SchlickIbl,
+    /// The same with k = (perceptual roughness + 1)²/8, which Karis 2013 gives for lights and not for environments.
+    SchlickLights,
+}
+
+impl Masking {
+    /// All of them.
+    pub const ALL: [Self; 4] =
+        [Self::SmithCorrelated, Self::SmithSeparable, Self::SchlickIbl, Self::SchlickLights];
+
+    /// V · n·l, finite for α > 0.
+    pub(crate) fn scattered(self, alpha: f64, n_dot_v: f64, n_dot_l: f64) -> f64 {
+        match self {
+            // 0/0 where both cosines are 0.
+            Self::SmithCorrelated => {
+                0.5 * n_dot_l / smith_denominator(alpha, n_dot_v, n_dot_l).max(f64::MIN_POSITIVE)
+            }
+            Self::SmithSeparable => n_dot_l / (smith_half(alpha, n_dot_v) * smith_half(alpha, n_dot_l)),
+            Self::SchlickIbl | Self::SchlickLights => {
+                let k = self.schlick_k(alpha);
+                0.25 * n_dot_l / (schlick_half(k, n_dot_v) * schlick_half(k, n_dot_l))
+            }
+        }
+    }
+
+    /// G of a mirror (α = 0) seen at `n_dot_v`.
+    pub(crate) fn mirror(self, n_dot_v: f64) -> f64 {
+        let k = self.schlick_k(0.0);
+        let g_1 = if k > 0.0 { n_dot_v / schlick_half(k, n_dot_v) } else { 1.0 };
+        g_1 * g_1
+    }
+
+    /// 0 for Smith's.
+    fn schlick_k(self, alpha: f64) -> f64 {
+        match self {
+            Self::SmithCorrelated | Self::SmithSeparable => 0.0,
+            Self::SchlickIbl => 0.5 * alpha,
+            Self::SchlickLights => (alpha.sqrt() + 1.0) * (alpha.sqrt() + 1.0) / 8.0,
+        }
+    }
+}
+
+/// 2x / G_1(x) of Smith's masking for GGX: x + √(α² + (1 − α²) x²).
+fn smith_half(alpha: f64, cosine: f64) -> f64 {
+    let alpha2 = alpha * alpha;
+    cosine + (alpha2 + (1.0 - alpha2) * cosine * cosine).sqrt()
+}
+
+/// x / G_1(x) of Schlick's masking.
+fn schlick_half(k: f64, cosine: f64) -> f64 {
+    cosine * (1.0 - k) + k
+}
+
 /// Charlie distribution of half vectors, (2 + 1/α) sin^(1/α) θ_h / 2π (Estevez and Kulla 2017, "Production Friendly
 /// Microfacet Sheen BRDF", eq. 2), 0 < α ≤ 1; underflows to 0 near the normal for small α.
 pub fn d_charlie(alpha: f64, sin_theta_h: f64) -> f64 {

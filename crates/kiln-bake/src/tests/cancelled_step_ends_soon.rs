@@ -13,7 +13,7 @@ const FOREVER: i64 = 1 << 60;
 
 /// `step` gives its result's bytes, or `None` once it is cancelled. It must look at its [`Cancel`] at least `checks_min`
 /// times: that, and not a clock, says that the looks are close to each other.
-fn check(checks_min: i64, step: impl Fn(Cancel) -> Option<Vec<u8>> + Sync) {
+pub(super) fn check(checks_min: i64, step: impl Fn(Cancel) -> Option<Vec<u8>> + Sync) {
     let wanted = step(Cancel::NEVER).expect("nobody cancels");
     let unset = step(Cancel::when(&AtomicBool::new(false)));
     assert!(unset.as_ref() == Some(&wanted), "a flag that stays unset changed the result");
