@@ -34,7 +34,8 @@ fn decode_unguarded(bytes: &[u8], limits: &Limits, cancel: Cancel) -> Result<Sou
     let words = bytes.get(..HEADER_BYTES).ok_or_else(|| truncated("the header"))?.as_chunks::<4>().0;
     let word = |index: usize| u32::from_le_bytes(words[index]);
     for (what, index, wanted) in [("the header's size", 1, 124), ("the pixel format's size", 19, 32)] {
-        if word(index) != wanted {
+        // Some writers leave them 0.
+        if word(index) != wanted && word(index) != 0 {
             return Err(invalid(what, format!("it is {}, not {wanted}", word(index))));
         }
     }

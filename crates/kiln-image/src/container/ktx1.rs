@@ -47,7 +47,7 @@ fn decode_unguarded(bytes: &[u8], limits: &Limits, cancel: Cancel) -> Result<Sou
     })?;
     let (width, height, faces) = (word(6) as usize, word(7) as usize, word(10) as usize);
     let kind = match (word(8), word(7), word(9), word(10)) {
-        (1.., ..) => Some("a volume"),
+        (2.., ..) => Some("a volume"),
         (_, 0, ..) => Some("a 1D texture"),
         (_, _, 1.., _) => Some("an array"),
         (_, _, _, 6) if width != height => Some("a cube whose faces are no squares"),

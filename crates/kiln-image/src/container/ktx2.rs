@@ -66,7 +66,7 @@ fn decode_unguarded(bytes: &[u8], limits: &Limits, cancel: Cancel) -> Result<Sou
 
 fn check_kind(header: &Header) -> Result<(), DecodeError> {
     let kind = match header {
-        Header { depth: 1.., .. } => "a volume",
+        Header { depth: 2.., .. } => "a volume",
         Header { height: 0, .. } => "a 1D texture",
         Header { layers: 2.., .. } => "an array",
         Header { faces: 6, width, height, .. } if width == height => return Ok(()),
@@ -100,9 +100,9 @@ fn texel_format(vk_format: u32) -> Result<TexelFormat, String> {
         124..=130 => "depth or stencil",
         131..=142 | 145 | 146 => "BC1 to BC5 or BC7",
         147..=156 => "ETC2 or EAC",
-        157..=184 | 1_000_066_000..=1_000_066_013 => "ASTC",
+        157..=184 | 1_000_066_000..=1_000_066_013 | 1_000_288_000..=1_000_288_029 => "ASTC",
         1_000_054_000..=1_000_054_007 => "PVRTC",
-        _ => "a format that cannot hold radiance",
+        _ => "an integer or packed format",
     };
     Err(format!(
         "VkFormat {vk_format} ({name}) is not read; 16- and 32-bit float, RGB9E5, B10G11R11, BC6H and 8-bit colour are"

@@ -15,7 +15,7 @@ pub enum Layout {
     /// below +Z. The tall one has −Z below −Y, turned by 180°.
     CubeCross,
     /// Octahedral, 1:1: +Y in the centre, −Y in the corners, +X at the right, −Z at the top. Resampled to a panorama as
-    /// high as the map, each of whose texels is the mean of at least 16 samples that share it equally by solid angle.
+    /// high as the map, each of whose texels is the mean of 16 samples that share it equally by solid angle (4096 at lamps).
     Octahedral,
     /// OpenEXR's cube: a column of six faces (1:6) in that format's own orientation.
     ///

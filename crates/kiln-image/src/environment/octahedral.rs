@@ -3,7 +3,7 @@
 //! Source: Engelhardt and Dachsbacher 2008, "Octahedron Environment Maps"; Cigolle et al. 2014, "A Survey of Efficient
 //! Representations for Independent Unit Vectors" (there with +Z up; here +Y).
 
-use crate::{Bulk, Cancel, DecodeError, Image, Limits, Panorama, decode::check_size};
+use crate::{Bulk, Cancel, Cancelled, DecodeError, Image, Limits, Panorama, decode::check_size};
 use std::f64::consts::PI;
 
 /// Unit direction at (`u`, `v`) in [0, 1]² of an octahedral map, from its top left; +Y in the centre, +X at the right, −Z at
@@ -30,11 +30,13 @@ fn fold(a: f64, b: f64) -> (f64, f64) {
     (libm::copysign(1.0 - b.abs(), a), libm::copysign(1.0 - a.abs(), b))
 }
 
-/// Samples along each side of a panorama texel: 16 a texel, more where the map is so small that its texels' slanted edges
-/// show.
-fn samples_per_side(size: usize) -> usize {
-    (128 / size).clamp(4, 16)
-}
+/// Samples along each side of a panorama texel, and where light and dark meet in it: the share of a lamp's texels that falls
+/// into it is then off by half a percent, with [`SAMPLES`] by 8 %.
+const SAMPLES: usize = 4;
+const SAMPLES_AT_LAMPS: usize = 64;
+
+/// A texel is at a lamp where samples in it and around it differ by more than this times the map's mean.
+const LAMP_CONTRAST: f64 = 4.0;
 
 /// A panorama as high as the map: the equator crosses about 2 · size of its texels.
 ///
@@ -44,34 +46,102 @@ pub(super) fn resample(map: &Image, limits: &Limits, cancel: Cancel) -> Result<P
     let size = map.width;
     let (width, height) = (2 * size, size);
     check_size("octahedral map as panorama", width, height, limits)?;
-    let samples = samples_per_side(size);
-    let columns: Vec<(f64, f64)> = (0..width * samples)
-        .map(|column| libm::sincos(2.0 * PI * ((column as f64 + 0.5) / (width * samples) as f64 - 0.5)))
-        .collect();
+    let contrast_max = LAMP_CONTRAST * mean(map, cancel)?;
+    let columns: Vec<[f64; 2]> = (0..width).flat_map(|column| longitudes(column, width, SAMPLES)).collect();
     let mut rgb = Bulk::new(Vec::with_capacity(width * height * 3));
-    let index = |position: f64| ((position * size as f64) as usize).min(size - 1);
+    let mut ranges: Bulk<Vec<Range>> = Bulk::new(Vec::with_capacity(width * height));
     for row in 0..height {
-        let edge = |row: usize| libm::cos(PI * row as f64 / height as f64);
-        let (top, bottom) = (edge(row), edge(row + 1));
-        let rings: Vec<(f64, f64)> = (0..samples)
-            .map(|sample| {
-                let y = top + (bottom - top) * (sample as f64 + 0.5) / samples as f64;
-                (y, (1.0 - y * y).max(0.0).sqrt())
-            })
-            .collect();
-        for longitudes in columns.chunks_exact(samples) {
-            let mut sum = [0.0; 3];
-            for &(y, radius) in &rings {
-                for &(sin, cos) in longitudes {
-                    let [u, v] = octahedral_uv([radius * sin, y, -radius * cos]);
-                    let texel = map.texel(index(u), index(v));
-                    sum.iter_mut().zip(texel).for_each(|(sum, value)| *sum += f64::from(value));
-                }
-            }
-            rgb.extend(sum.map(|sum| (sum / (samples * samples) as f64) as f32));
+        let rings = rings(row, height, SAMPLES);
+        for longitudes in columns.chunks_exact(SAMPLES) {
             // 16 samples a texel: a row of 16384 would be milliseconds.
             cancel.check()?;
+            let texel = sample(map, &rings, longitudes);
+            rgb.extend(texel.mean.map(|value| value as f32));
+            ranges.push(texel.range);
+        }
+    }
+    for row in 0..height {
+        let rings = rings(row, height, SAMPLES_AT_LAMPS);
+        for column in 0..width {
+            cancel.check()?;
+            if contrast_around(&ranges, width, row, column) > contrast_max {
+                let longitudes: Vec<[f64; 2]> = longitudes(column, width, SAMPLES_AT_LAMPS).collect();
+                let start = (row * width + column) * 3;
+                let values = rgb[start..start + 3].iter_mut().zip(sample(map, &rings, &longitudes).mean);
+                values.for_each(|(value, mean)| *value = mean as f32);
+            }
         }
     }
     Ok(Panorama::new(Image::new(width, height, rgb.into_inner())?)?)
+}
+
+/// The contrast in a texel and its eight neighbours: a lamp's corner may reach in between the samples.
+fn contrast_around(ranges: &[Range], width: usize, row: usize, column: usize) -> f64 {
+    let rows = row.saturating_sub(1)..(row + 2).min(ranges.len() / width);
+    let columns = [column + width - 1, column, column + 1].map(|column| column % width);
+    let around = rows.flat_map(|row| columns.map(|column| &ranges[row * width + column]));
+    let [lowest, highest] =
+        around.fold(EMPTY, |[lowest, highest], range| [lowest.min(range[0]), highest.max(range[1])]);
+    f64::from(highest) - f64::from(lowest)
+}
+
+/// Mean of the channels' sum over finite texels.
+fn mean(map: &Image, cancel: Cancel) -> Result<f64, Cancelled> {
+    let (mut sum, mut count) = (0.0, 0_usize);
+    for y in 0..map.height {
+        cancel.check()?;
+        let sums =
+            map.row(y).chunks_exact(3).map(|texel| texel.iter().map(|&value| f64::from(value)).sum::<f64>());
+        sums.filter(|sum| sum.is_finite()).for_each(|texel| {
+            sum += texel;
+            count += 1;
+        });
+    }
+    Ok(sum / count.max(1) as f64)
+}
+
+/// Sine and cosine of even steps in longitude over a column.
+fn longitudes(column: usize, width: usize, samples: usize) -> impl Iterator<Item = [f64; 2]> {
+    (0..samples).map(move |sample| {
+        let u = ((column * samples + sample) as f64 + 0.5) / (width * samples) as f64;
+        libm::sincos(2.0 * PI * (u - 0.5)).into()
+    })
+}
+
+/// Height and radius of even steps in y over a row.
+fn rings(row: usize, height: usize, samples: usize) -> Vec<[f64; 2]> {
+    let edge = |row: usize| libm::cos(PI * row as f64 / height as f64);
+    let (top, bottom) = (edge(row), edge(row + 1));
+    let ring = |sample: usize| {
+        let y = top + (bottom - top) * (sample as f64 + 0.5) / samples as f64;
+        [y, (1.0 - y * y).max(0.0).sqrt()]
+    };
+    (0..samples).map(ring).collect()
+}
+
+/// Smallest and largest sum of channels.
+type Range = [f32; 2];
+
+const EMPTY: Range = [f32::INFINITY, f32::NEG_INFINITY];
+
+struct Sampled {
+    mean: [f64; 3],
+    range: Range,
+}
+
+fn sample(map: &Image, rings: &[[f64; 2]], longitudes: &[[f64; 2]]) -> Sampled {
+    let size = map.width;
+    let index = |position: f64| ((position * size as f64) as usize).min(size - 1);
+    let (mut sum, mut range) = ([0.0; 3], EMPTY);
+    for &[y, radius] in rings {
+        for &[sin, cos] in longitudes {
+            let [u, v] = octahedral_uv([radius * sin, y, -radius * cos]);
+            let texel = map.texel(index(u), index(v)).map(f64::from);
+            sum.iter_mut().zip(texel).for_each(|(sum, value)| *sum += value);
+            let light = (texel[0] + texel[1] + texel[2]) as f32;
+            range = [range[0].min(light), range[1].max(light)];
+        }
+    }
+    let count = (rings.len() * longitudes.len()) as f64;
+    Sampled { mean: sum.map(|sum| sum / count), range }
 }
