@@ -395,6 +395,32 @@ fn dds_without_all_faces_or_with_another_format_is_refused_by_name() {
     assert!(open(&dds(None, 113, &faces, &[], ALL_FACES)).is_ok(), "the check itself");
 }
 
+/// One sound file of each kind and format that is read.
+pub(super) fn files() -> Vec<Vec<u8>> {
+    let values = values(4);
+    let data = halves(&values);
+    let faces: Vec<&[u8]> = data.chunks_exact(32).collect();
+    let packed = words(&[0x4321_1234; 24]);
+    let blocks = bc6h_constant(300).repeat(6);
+    let block_faces: Vec<&[u8]> = blocks.chunks_exact(16).collect();
+    let mut files = vec![
+        Ktx2 { is_compressed: true, ..Ktx2::cube(97, 2) }.bytes(&data),
+        Ktx2 { key_values: vec![("KTXswizzle", "bgr1")], primaries: 10, ..Ktx2::cube(97, 2) }.bytes(&data),
+        Ktx2 { levels: 2, ..Ktx2::cube(143, 2) }.bytes(&blocks),
+        Ktx2 { size: [4, 2, 0], faces: 1, key_values: vec![("KTXorientation", "ru")], ..Ktx2::cube(97, 0) }
+            .bytes(&data[..64]),
+        ktx1(0x1401, 1, 0x1907, 0x8c41, &packed[..72], false),
+        dds(Some(95), 0, &block_faces, &[], ALL_FACES),
+        dds(None, 113, &faces, &[1; 8], ALL_FACES),
+    ];
+    for is_swapped in [false, true] {
+        files.push(ktx1(0x140b, 2, 0x1908, 0x881a, &data, is_swapped));
+        files.push(ktx1(0x8c3e, 4, 0x1907, 0x8c3d, &packed, is_swapped));
+    }
+    files.extend([122, 123, 37].map(|vk_format| Ktx2::cube(vk_format, 2).bytes(&packed)));
+    files
+}
+
 #[test]
 fn every_truncation_is_refused() {
     let values = values(4);
