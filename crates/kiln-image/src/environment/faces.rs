@@ -125,8 +125,7 @@ pub(super) fn square_texels(
             return Ok(image);
         }
     };
-    let size = |length: usize, times: usize| length.checked_mul(times).unwrap_or(usize::MAX);
-    let (width, height) = (size(image.width, columns), size(image.height, rows));
+    let (width, height) = (image.width.saturating_mul(columns), image.height.saturating_mul(rows));
     check_size("texel aspect", width, height, limits)?;
     let mut rgb = Bulk::new(Vec::with_capacity(width * height * 3));
     for y in 0..height {

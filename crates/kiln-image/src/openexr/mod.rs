@@ -2,13 +2,14 @@
 //! chunk bounds before anything is allocated, places the data window and converts colours.
 //!
 //! Read: scan lines and tiles (largest level), every compression of the crate, half, float and uint
-//! samples, RGB or luminance, luminance with chroma stored at full size. Not read: deep parts,
-//! subsampled chroma, HTJ2K.
+//! samples, RGB or luminance, luminance with chroma at full or half size. Not read: deep parts,
+//! half-size chroma in several parts or with B44, HTJ2K.
 //!
 //! Source: "OpenEXR File Layout" and "Technical Introduction to OpenEXR" (Academy Software Foundation).
 
 mod channels;
 mod chunks;
+mod subsampled;
 
 use crate::{
     Bulk, Cancel, DecodeError, Image, Layout, Limits,
@@ -38,14 +39,23 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits, cancel: Cancel) -> Result<So
 }
 
 fn decode_unguarded(bytes: &[u8], limits: &Limits, cancel: Cancel) -> Result<Source, DecodeError> {
-    let (meta, chunk_tables_start) = read_meta(bytes)?;
+    let full = subsampled::with_full_sampling(bytes);
+    let bytes = full.as_ref().map_or(bytes, |full| &full.bytes);
+    let (mut meta, chunk_tables_start) = read_meta(bytes)?;
+    if let Some(full) = &full {
+        subsampled::restore(&mut meta, &full.sampling)?;
+    }
     check_tables(&meta, bytes.len(), chunk_tables_start, limits)?;
     let (part, channels) = choose_part(&meta)?;
     let header = &meta.headers[part];
     check_part(header, limits)?;
 
     let mut notes = part_notes(&meta, part, &channels);
-    let mut rgb = chunks::read_part(bytes, &meta, part, chunk_tables_start, &channels, cancel)?;
+    let mut rgb = if subsampled::is_subsampled(header) {
+        subsampled::read_part(bytes, &meta, chunk_tables_start, &channels, cancel)?
+    } else {
+        chunks::read_part(bytes, &meta, part, chunk_tables_start, &channels, cancel)?
+    };
     let gamut = convert_colour(header, &mut rgb, &channels, &mut notes, cancel)?;
     let image = place(header, rgb, limits, &mut notes, cancel)?;
     let declared = header.own_attributes.environment_map.map(|map| match map {

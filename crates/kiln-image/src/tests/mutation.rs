@@ -2,7 +2,7 @@
 //!
 //! `KILN_FUZZ_COUNT=1000000 cargo test --release -p kiln-image mutation` makes a long run of it; `KILN_FUZZ_SEED` another one.
 
-use super::{Random, containers};
+use super::{Random, containers, exr_files::half_size_chroma};
 use crate::{
     Cancel, DecodeError, Image, Layout, Limits, Texels, decode, decode_environment, environment_from_faces,
     hdr, ktx2, png,
@@ -63,6 +63,7 @@ fn files() -> Vec<Vec<u8>> {
         files.push(exr_file(compression, Blocks::ScanLines));
     }
     files.push(exr_file(ZIP16, Blocks::Tiles(Vec2(16, 16))));
+    files.push(half_size_chroma());
     files
 }
 
