@@ -136,7 +136,7 @@ pub enum DecodeError {
     /// An environment whose layout its shape does not tell.
     #[error(
         "an image of {width} × {height} has the shape of no environment: equirect is 2:1, cube-strip 6:1 or 1:6, \
-         cube-cross 4:3 or 3:4, octahedral 1:1 (only if asked for); convert it, or state its layout"
+         cube-cross 4:3 or 3:4, octahedral 1:1 (only with `layout = \"octahedral\"`); convert it, or state its layout"
     )]
     UnknownLayout {
         /// Columns.

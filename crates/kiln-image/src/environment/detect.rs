@@ -137,7 +137,7 @@ pub(super) fn of_image(
     let hint = if asked.is_some() {
         ""
     } else {
-        "; to read it otherwise, give a layout (cube-strip, octahedral …)"
+        "; `layout = \"…\"` (or --layout) reads it otherwise: equirect, cube-strip, cube-cross, octahedral, exr-cube"
     };
     Ok(Found { layout, note: format!("layout: {layout}, {origin}, {width} × {height}{hint}") })
 }

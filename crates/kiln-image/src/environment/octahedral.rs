@@ -35,8 +35,10 @@ fn fold(a: f64, b: f64) -> (f64, f64) {
 const SAMPLES: usize = 4;
 const SAMPLES_AT_LAMPS: usize = 64;
 
-/// A texel is at a lamp where samples in it and around it differ by more than this times the map's mean.
-const LAMP_CONTRAST: f64 = 4.0;
+/// A texel is at a lamp where samples in it and around it differ by more than this times the sum of all the map's texels.
+/// There are at most 10⁴ such lamps, so their cost is bounded, whatever the map; what is not taken for one is off by less than
+/// 8·10⁻⁶ of all the light.
+const LAMP_SHARE: f64 = 1e-4;
 
 /// A panorama as high as the map: the equator crosses about 2 · size of its texels.
 ///
@@ -46,7 +48,7 @@ pub(super) fn resample(map: &Image, limits: &Limits, cancel: Cancel) -> Result<P
     let size = map.width;
     let (width, height) = (2 * size, size);
     check_size("octahedral map as panorama", width, height, limits)?;
-    let contrast_max = LAMP_CONTRAST * mean(map, cancel)?;
+    let contrast_max = LAMP_SHARE * sum(map, cancel)?;
     let columns: Vec<[f64; 2]> = (0..width).flat_map(|column| longitudes(column, width, SAMPLES)).collect();
     let mut rgb = Bulk::new(Vec::with_capacity(width * height * 3));
     let mut ranges: Bulk<Vec<Range>> = Bulk::new(Vec::with_capacity(width * height));
@@ -85,19 +87,15 @@ fn contrast_around(ranges: &[Range], width: usize, row: usize, column: usize) ->
     f64::from(highest) - f64::from(lowest)
 }
 
-/// Mean of the channels' sum over finite texels.
-fn mean(map: &Image, cancel: Cancel) -> Result<f64, Cancelled> {
-    let (mut sum, mut count) = (0.0, 0_usize);
+/// All channels of all finite texels, the magnitude of each.
+fn sum(map: &Image, cancel: Cancel) -> Result<f64, Cancelled> {
+    let mut sum = 0.0;
     for y in 0..map.height {
         cancel.check()?;
-        let sums =
-            map.row(y).chunks_exact(3).map(|texel| texel.iter().map(|&value| f64::from(value)).sum::<f64>());
-        sums.filter(|sum| sum.is_finite()).for_each(|texel| {
-            sum += texel;
-            count += 1;
-        });
+        let values = map.row(y).iter().map(|&value| f64::from(value.abs()));
+        sum += values.filter(|value| value.is_finite()).sum::<f64>();
     }
-    Ok(sum / count.max(1) as f64)
+    Ok(sum)
 }
 
 /// Sine and cosine of even steps in longitude over a column.
