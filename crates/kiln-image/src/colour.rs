@@ -65,6 +65,48 @@ pub fn luminance(rgb: [f32; 3]) -> f64 {
     weighted(0) + weighted(1) + weighted(2)
 }
 
+/// The colour space an image was stored in, where it is another than Rec. 709.
+///
+/// A negative Rec. 709 value of a converted image means one of two things: a colour that Rec. 709 cannot hold, when all
+/// stored values were radiance, or a stored value that was negative already, which no light makes (ringing of a
+/// resampling filter). The matrix back tells them apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gamut {
+    to_rec_709: Matrix,
+    from_rec_709: Matrix,
+}
+
+/// A stored value above −this times the texel's largest is a zero that went through binary32: its rounding, 6e-8, grows by
+/// the condition of the matrices, which stays below 20 for spaces in use.
+const STORED_ZERO: f64 = 2e-6;
+
+impl Gamut {
+    /// The space that `to_rec_709` converts from; `None` where the matrix has no inverse.
+    pub fn new(to_rec_709: Matrix) -> Option<Gamut> {
+        // Scaled first: the divisor of XYZE makes a determinant of 1e-7 that is as sound as any.
+        let size = to_rec_709.iter().flatten().fold(0.0_f64, |size, value| size.max(value.abs()));
+        let inverse = invert(&to_rec_709.map(|row| row.map(|value| value / size)))?;
+        finite(inverse.map(|row| row.map(|value| value / size)))
+            .map(|from_rec_709| Gamut { to_rec_709, from_rec_709 })
+    }
+
+    /// What a Rec. 709 texel was as stored, up to rounding.
+    pub fn stored(&self, rgb: [f32; 3]) -> [f64; 3] {
+        transform(&self.from_rec_709, rgb.map(f64::from))
+    }
+
+    /// The Rec. 709 texel of stored values, before rounding.
+    pub fn converted(&self, stored: [f64; 3]) -> [f64; 3] {
+        transform(&self.to_rec_709, stored)
+    }
+
+    /// Whether stored values, as [`Gamut::stored`] gives them, hold a negative one that is no rounding.
+    pub(crate) fn is_negative(stored: [f64; 3]) -> bool {
+        let largest = stored.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        stored.iter().any(|&value| value < -STORED_ZERO * largest)
+    }
+}
+
 /// The matrix from linear RGB of `source` to linear Rec. 709 D65.
 ///
 /// White is adapted with Bradford's cone responses, so (1, 1, 1) stays (1, 1, 1): a file's white is the

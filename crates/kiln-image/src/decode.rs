@@ -1,6 +1,8 @@
-//! The one entry: sniffs the content, checks the limits, hands over to a format.
+//! The entry for pictures: sniffs the content, checks the limits, hands over to a format.
 
-use crate::{Cancel, Cancelled, Image, LayoutError, hdr, ldr, openexr};
+use crate::{
+    Cancel, Cancelled, Cube, Image, Layout, LayoutError, colour::Gamut, container, hdr, ldr, openexr,
+};
 use thiserror::Error;
 
 /// What came out of a file.
@@ -8,10 +10,56 @@ use thiserror::Error;
 pub struct Decoded {
     /// Linear Rec. 709 D65, relative radiance, upright.
     pub image: Image,
-    /// `"Radiance HDR"`, `"OpenEXR"`, `"PNG"` or `"JPEG"`.
+    /// `"Radiance HDR"`, `"OpenEXR"`, `"PNG"`, `"JPEG"`, `"KTX2"`, `"KTX1"` or `"DDS"`.
     pub format: &'static str,
     /// What a person should know: conversions made, parts chosen, attributes without effect.
     pub notes: Vec<String>,
+}
+
+/// Everything a file says, before anybody asks what its texels show.
+#[derive(Clone, Debug)]
+pub(crate) struct Source {
+    pub format: &'static str,
+    pub texels: Stored,
+    pub notes: Vec<String>,
+    /// The colour space converted from, if any.
+    pub gamut: Option<Gamut>,
+    /// Height of a texel over its width, as the file states it.
+    pub texel_aspect: f64,
+    /// The layout the file itself names.
+    pub declared: Option<Layout>,
+}
+
+/// Texels as a file holds them.
+#[derive(Clone, Debug)]
+pub(crate) enum Stored {
+    Flat(Image),
+    Cube(Cube),
+}
+
+impl Source {
+    /// An image with square texels, of no stated layout and without conversion.
+    pub(crate) fn flat(format: &'static str, image: Image, notes: Vec<String>) -> Source {
+        Source { format, texels: Stored::Flat(image), notes, gamut: None, texel_aspect: 1.0, declared: None }
+    }
+
+    /// The flat image; a cube is refused.
+    pub(crate) fn into_decoded(self) -> Result<Decoded, DecodeError> {
+        let Source { format, texels, mut notes, texel_aspect, declared, .. } = self;
+        let Stored::Flat(image) = texels else {
+            let reason = "it is a cube map, and a flat picture is wanted here".to_owned();
+            return Err(DecodeError::Unsupported { format, reason });
+        };
+        if declared == Some(Layout::ExrCube) {
+            notes.push("the file says it is a cube map: six faces, stacked".to_owned());
+        }
+        if texel_aspect != 1.0 {
+            notes.push(format!(
+                "texels {texel_aspect} times as high as wide are taken as square: the stated aspect has no effect"
+            ));
+        }
+        Ok(Decoded { image, format, notes })
+    }
 }
 
 /// The largest image that is accepted; checked against headers before anything is allocated.
@@ -40,7 +88,7 @@ impl Default for Limits {
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum DecodeError {
     /// No signature that is known.
-    #[error("neither Radiance HDR, OpenEXR, PNG nor JPEG: the file starts with {start:?}")]
+    #[error("neither Radiance HDR, OpenEXR, PNG, JPEG, KTX nor DDS: the file starts with {start:?}")]
     UnknownFormat {
         /// The first bytes, printable ones as they are.
         start: String,
@@ -85,6 +133,35 @@ pub enum DecodeError {
         /// The limit.
         limit: u64,
     },
+    /// An environment whose layout its shape does not tell.
+    #[error(
+        "an image of {width} × {height} has the shape of no environment: equirect is 2:1, cube-strip 6:1 or 1:6, \
+         cube-cross 4:3 or 3:4, octahedral 1:1 (only with `layout = \"octahedral\"`); convert it, or state its layout"
+    )]
+    UnknownLayout {
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+    },
+    /// A layout was asked for, or stated by the file, that the texels do not have.
+    #[error("{layout} {wanted}; this is {actual}")]
+    WrongLayout {
+        /// The layout.
+        layout: Layout,
+        /// What it must be.
+        wanted: &'static str,
+        /// What it is.
+        actual: String,
+    },
+    /// One of six files is wrong.
+    #[error("face {face}: {source}")]
+    Face {
+        /// `+X` to `-Z`.
+        face: &'static str,
+        /// What is wrong with its file.
+        source: Box<DecodeError>,
+    },
     /// A size that makes no image.
     #[error(transparent)]
     Layout(#[from] LayoutError),
@@ -96,22 +173,32 @@ pub enum DecodeError {
 /// Texels between two looks at a [`Cancel`]: about a millisecond's work.
 pub(crate) const CHECK_TEXELS: usize = 1 << 14;
 
-/// Decodes a file by its content; names and extensions do not matter.
+/// Decodes a flat picture by its content; names and extensions do not matter.
+///
+/// For what surrounds a scene use [`decode_environment`](crate::decode_environment()): it knows cubes and layouts.
 ///
 /// # Errors
 /// [`DecodeError`], for anything but a whole image within `limits`. Nothing panics on hostile bytes and
 /// nothing larger than the limits is allocated.
 ///
 /// [`DecodeError::Cancelled`] comes within a row's work or, where another's decoder cannot be interrupted, after it:
-/// the whole of a PNG or JPEG (tens of milliseconds for 4096 × 2048 texels), one chunk of an OpenEXR file (milliseconds, but for
+/// the whole of a PNG or JPEG (tens of milliseconds for 4096 × 2048 texels), Zstandard data of a KTX2, one chunk of an OpenEXR file (milliseconds, but for
 /// DWAB's 256 lines and tiles as large as the image).
 pub fn decode(bytes: &[u8], limits: &Limits, cancel: Cancel) -> Result<Decoded, DecodeError> {
+    decode_source(bytes, limits, cancel)?.into_decoded()
+}
+
+/// [`decode`], with cubes and everything else that the layout of an environment follows from.
+pub(crate) fn decode_source(bytes: &[u8], limits: &Limits, cancel: Cancel) -> Result<Source, DecodeError> {
     cancel.check()?;
     match bytes {
-        [b'#', b'?', ..] => hdr::decode(bytes, limits, cancel),
+        [b'#', b'?', ..] => hdr::decode_source(bytes, limits, cancel),
         [0x76, 0x2f, 0x31, 0x01, ..] => openexr::decode(bytes, limits, cancel),
         [0x89, b'P', b'N', b'G', ..] => ldr::decode(bytes, ldr::Kind::Png, limits, cancel),
         [0xff, 0xd8, 0xff, ..] => ldr::decode(bytes, ldr::Kind::Jpeg, limits, cancel),
+        [0xab, b'K', b'T', b'X', b' ', b'2', ..] => container::ktx2::decode(bytes, limits, cancel),
+        [0xab, b'K', b'T', b'X', b' ', b'1', ..] => container::ktx1::decode(bytes, limits, cancel),
+        [b'D', b'D', b'S', b' ', ..] => container::dds::decode(bytes, limits, cancel),
         _ => Err(DecodeError::UnknownFormat { start: printable_start(bytes) }),
     }
 }

@@ -133,6 +133,11 @@ impl Panorama {
         self.0.rgb.iter().copied().fold(f32::NEG_INFINITY, f32::max)
     }
 
+    /// The same values, to be changed.
+    pub fn rgb_mut(&mut self) -> &mut [f32] {
+        &mut self.0.rgb
+    }
+
     /// The same texels as a plain image.
     pub fn image(&self) -> &Image {
         &self.0

@@ -1,9 +1,9 @@
 //! PNG and JPEG: display-referred pictures, decoded as what they can at most mean.
 
 use crate::{
-    Bulk, Cancel, Cancelled, DecodeError, Decoded, Image, Limits,
+    Bulk, Cancel, Cancelled, DecodeError, Image, Limits,
     colour::srgb_to_linear,
-    decode::{CHECK_TEXELS, check_size, guard},
+    decode::{CHECK_TEXELS, Source, check_size, guard},
 };
 use image::{DynamicImage, ImageDecoder, ImageError, ImageReader};
 use std::io::Cursor;
@@ -30,7 +30,7 @@ pub(crate) fn decode(
     kind: Kind,
     limits: &Limits,
     cancel: Cancel,
-) -> Result<Decoded, DecodeError> {
+) -> Result<Source, DecodeError> {
     guard(kind.name(), || decode_unguarded(bytes, kind, limits, cancel))
 }
 
@@ -39,7 +39,7 @@ fn decode_unguarded(
     kind: Kind,
     limits: &Limits,
     cancel: Cancel,
-) -> Result<Decoded, DecodeError> {
+) -> Result<Source, DecodeError> {
     let format = kind.name();
     let failed = |error| explain(error, format, bytes.len());
     let image_format = match kind {
@@ -59,7 +59,7 @@ fn decode_unguarded(
         notes.push("alpha was ignored".to_owned());
     }
     let image = Image::new(width as usize, height as usize, linear_values(decoded, cancel)?)?;
-    Ok(Decoded { image, format, notes })
+    Ok(Source::flat(format, image, notes))
 }
 
 fn linear_values(decoded: DynamicImage, cancel: Cancel) -> Result<Vec<f32>, Cancelled> {

@@ -1,8 +1,8 @@
 //! Images of radiance: decoded, checked, encoded.
 //!
-//! Start at [`decode()`]: file bytes in, a linear [`Image`] and what is worth saying about it out.
-//! [`Panorama`] and [`Cube`] are the two layouts the baker knows; [`check_texels`] says what is wrong
-//! with an image's numbers and [`TexelPolicy`] what to do about it.
+//! Start at [`decode_environment()`]: file bytes in, a [`Panorama`] or a [`Cube`] and what is worth saying about it out;
+//! [`decode()`] is the same for flat pictures. [`check_texels`] says what is wrong with an image's numbers and
+//! [`TexelPolicy`] what to do about it.
 //!
 //! Conventions: right-handed, +Y up; a panorama's centre column looks along −Z, its right half towards
 //! +X, row 0 is the top (+Y); cube faces in KTX2 order +X −X +Y −Y +Z −Z, each row-major from its top
@@ -13,7 +13,9 @@
 //! Not here: what a map means (`kiln-bake`), directions and transforms (`kiln-sphere`), files (`kiln-project`).
 
 pub mod colour;
+mod container;
 mod decode;
+mod environment;
 pub mod hdr;
 pub mod ktx2;
 mod layout;
@@ -29,5 +31,12 @@ mod tests;
 pub use kiln_sphere::{Bulk, Cancel, Cancelled};
 
 pub use decode::{DecodeError, Decoded, Limits, decode};
+pub use environment::{
+    CubePlacement, DecodedEnvironment, Environment, FACE_NAMES, FacePlacement, Layout, UnknownLayoutName,
+    decode_environment, environment_from_faces, octahedral_direction, octahedral_uv,
+};
 pub use layout::{Cube, Image, LayoutError, Panorama};
-pub use texels::{Defect, Place, Repair, TexelError, TexelPolicy, TexelReport, check_texels, repair_texels};
+pub use texels::{
+    Defect, LimitReport, Place, Repair, Shape, TexelError, TexelPolicy, TexelReport, Texels, check_texels,
+    limit_radiance, repair_texels,
+};

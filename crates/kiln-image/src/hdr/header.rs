@@ -42,6 +42,8 @@ pub(super) struct Header {
     /// Product of all COLORCORR lines.
     pub colour_correction: [f64; 3],
     pub primaries: Option<Chromaticities>,
+    /// Product of all PIXASPECT lines: height of a texel over its width.
+    pub texel_aspect: f64,
     pub orientation: Orientation,
     pub notes: Vec<String>,
     /// Byte where the first scanline starts.
@@ -56,6 +58,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header, DecodeError> {
         exposure: 1.0,
         colour_correction: [1.0; 3],
         primaries: None,
+        texel_aspect: 1.0,
         orientation: Orientation {
             slow: Axis { length: 0, is_reversed: false },
             fast: Axis { length: 0, is_reversed: false },
@@ -98,17 +101,13 @@ impl Header {
                 // Photoshop writes eight zeros where it knows no primaries.
                 self.primaries = (xy != [0.0; 8]).then(|| Chromaticities::from_array(xy));
             }
-            "PIXASPECT" => self.note_unless_one("PIXASPECT", value, "texels are taken as square"),
-            "GAMMA" => self.note_unless_one("GAMMA", value, "values are taken as linear"),
+            "PIXASPECT" => self.texel_aspect *= parse_positive::<1>(value, "PIXASPECT", number)?[0],
+            "GAMMA" if value.parse() != Ok(1.0) => {
+                self.notes.push(format!("GAMMA={value} has no effect: values are taken as linear"));
+            }
             _ => {}
         }
         Ok(())
-    }
-
-    fn note_unless_one(&mut self, name: &str, value: &str, consequence: &str) {
-        if value.parse() != Ok(1.0) {
-            self.notes.push(format!("{name}={value} has no effect: {consequence}"));
-        }
     }
 }
 

@@ -12,7 +12,11 @@ mod scanline;
 
 pub use encode::encode;
 
-use crate::{Bulk, Cancel, Cancelled, DecodeError, Decoded, Image, Limits, colour, decode::check_size};
+use crate::{
+    Bulk, Cancel, Cancelled, DecodeError, Decoded, Image, Limits,
+    colour::{self, Gamut},
+    decode::{Source, check_size},
+};
 use header::{Axis, Header, Orientation, PixelFormat};
 use scanline::{Reader, line_bytes_min};
 
@@ -26,12 +30,17 @@ const WHITE_EFFICACY: f64 = 179.0;
 ///
 /// RGBE and XYZE, flat and both run-length forms, all eight orientations. EXPOSURE and COLORCORR are
 /// undone, PRIMARIES converted to Rec. 709 (all-zero, as Photoshop writes it, means absent), PIXASPECT
-/// and GAMMA noted. XYZE is divided by Radiance's 179 lm/W, so that a picture has the same values in
+/// and GAMMA noted (of an environment, whole multiples of PIXASPECT are undone). XYZE is divided by Radiance's 179 lm/W, so that a picture has the same values in
 /// either form.
 ///
 /// # Errors
 /// [`DecodeError`] with header line, row and byte; [`DecodeError::Cancelled`] within a row's work.
 pub fn decode(bytes: &[u8], limits: &Limits, cancel: Cancel) -> Result<Decoded, DecodeError> {
+    decode_source(bytes, limits, cancel)?.into_decoded()
+}
+
+/// [`decode`], with the shape of texels and the colour space they were stored in.
+pub(crate) fn decode_source(bytes: &[u8], limits: &Limits, cancel: Cancel) -> Result<Source, DecodeError> {
     let header = header::parse(bytes)?;
     let orientation = header.orientation;
     let (width, height) = orientation.image_size();
@@ -40,8 +49,9 @@ pub fn decode(bytes: &[u8], limits: &Limits, cancel: Cancel) -> Result<Decoded, 
     let mut rgb = orientation.upright(stored, cancel)?;
     let mut notes = header.notes.clone();
     undo_exposure(&header, &mut rgb, &mut notes, cancel)?;
-    convert_colour(&header, &mut rgb, &mut notes, cancel)?;
-    Ok(Decoded { image: Image::new(width, height, rgb.into_inner())?, format: FORMAT, notes })
+    let gamut = convert_colour(&header, &mut rgb, &mut notes, cancel)?;
+    let image = Image::new(width, height, rgb.into_inner())?;
+    Ok(Source { gamut, texel_aspect: header.texel_aspect, ..Source::flat(FORMAT, image, notes) })
 }
 
 /// Reads in file order. Memory grows with what the bytes yield, not with what the header claims, unless the bytes are
@@ -93,7 +103,7 @@ fn convert_colour(
     rgb: &mut [f32],
     notes: &mut Vec<String>,
     cancel: Cancel,
-) -> Result<(), DecodeError> {
+) -> Result<Option<Gamut>, DecodeError> {
     let (source, divisor) = match (header.pixel_format, header.primaries) {
         (PixelFormat::Xyze, _) => {
             notes.push(
@@ -101,19 +111,21 @@ fn convert_colour(
             );
             (colour::CIE_XYZ, WHITE_EFFICACY)
         }
-        (PixelFormat::Rgbe, None) => return Ok(()),
-        (PixelFormat::Rgbe, Some(primaries)) if primaries.is_close_to(colour::REC_709) => return Ok(()),
+        (PixelFormat::Rgbe, None) => return Ok(None),
+        (PixelFormat::Rgbe, Some(primaries)) if primaries.is_close_to(colour::REC_709) => return Ok(None),
         (PixelFormat::Rgbe, Some(primaries)) => {
             notes.push(format!("PRIMARIES {:?} were converted to Rec. 709", primaries.to_array()));
             (primaries, 1.0)
         }
     };
-    let matrix = colour::to_rec_709(source).ok_or_else(|| DecodeError::Invalid {
+    let no_space = || DecodeError::Invalid {
         format: FORMAT,
         place: "PRIMARIES".to_owned(),
         reason: format!("{:?} span no colour space", source.to_array()),
-    })?;
-    Ok(colour::transform_texels(&matrix.map(|row| row.map(|value| value / divisor)), rgb, cancel)?)
+    };
+    let matrix = colour::to_rec_709(source).ok_or_else(no_space)?.map(|row| row.map(|value| value / divisor));
+    colour::transform_texels(&matrix, rgb, cancel)?;
+    Ok(Some(Gamut::new(matrix).ok_or_else(no_space)?))
 }
 
 impl Orientation {

@@ -6,6 +6,7 @@
 mod read;
 mod write;
 
+pub(crate) use read::{Header, key_values, level_bytes, read_header};
 pub use read::{KtxError, OwnedTexture, read};
 pub use write::write;
 

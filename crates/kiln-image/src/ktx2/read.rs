@@ -5,6 +5,7 @@ use super::{
     write::{HEADER_BYTES, LEVEL_ENTRY_BYTES},
 };
 use crate::{Cube, Image, LayoutError};
+use std::{borrow::Cow, io::Read};
 use thiserror::Error;
 
 /// A texture read back.
@@ -59,6 +60,14 @@ pub enum KtxError {
         /// Bytes wanted; `u64::MAX` where the product overflows.
         expected: u64,
     },
+    /// Level whose Zstandard data are damaged.
+    #[error("level {level} cannot be decompressed: {reason}")]
+    Zstandard {
+        /// Level, 0 the largest.
+        level: usize,
+        /// The decoder's words.
+        reason: String,
+    },
     /// Level or face that is not there, or texels that make no image.
     #[error("the texture has no level {level} with {faces} face(s)")]
     NoSuchLevel {
@@ -72,52 +81,124 @@ pub enum KtxError {
     Layout(#[from] LayoutError),
 }
 
+/// The numbers at a file's start, unchecked but for the levels' count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Header {
+    pub vk_format: u32,
+    pub width: u32,
+    pub height: u32,
+    pub depth: u32,
+    pub layers: u32,
+    pub faces: u32,
+    pub level_count: u32,
+    pub supercompression: u32,
+    pub descriptor_start: u32,
+    pub key_values: [u32; 2],
+}
+
+/// Supercompression schemes: none, and Zstandard.
+const NONE: u32 = 0;
+const ZSTANDARD: u32 = 2;
+
+/// Levels of the largest texture that 32 bits can state.
+const LEVELS_MAX: u32 = 32;
+
+/// The largest window that is decompressed, 128 MiB: what Zstandard's own tool accepts unasked.
+const ZSTANDARD_WINDOW_LOG_MAX: u32 = 27;
+
+/// Reads the header.
+pub(crate) fn read_header(bytes: &[u8]) -> Result<Header, KtxError> {
+    let rest = bytes.strip_prefix(&IDENTIFIER).ok_or(KtxError::Identifier)?;
+    let truncated = KtxError::Truncated { what: "the header", end: bytes.len() };
+    let (words, _) = rest.first_chunk::<{ HEADER_BYTES - 12 }>().ok_or(truncated)?.as_chunks();
+    let word = |index: usize| u32::from_le_bytes(words[index]);
+    let header = Header {
+        vk_format: word(0),
+        width: word(2),
+        height: word(3),
+        depth: word(4),
+        layers: word(5),
+        faces: word(6),
+        level_count: word(7),
+        supercompression: word(8),
+        descriptor_start: word(9),
+        key_values: [word(11), word(12)],
+    };
+    if header.level_count > LEVELS_MAX {
+        return Err(KtxError::Unsupported { what: "level count", actual: header.level_count });
+    }
+    Ok(header)
+}
+
 /// Reads a container; nothing is allocated before its bytes are seen.
 ///
 /// # Errors
-/// [`KtxError`] for anything but a plain 2D or cube float texture.
+/// [`KtxError`] for anything but a plain 2D or cube float texture, with or without Zstandard.
 pub fn read(bytes: &[u8]) -> Result<OwnedTexture, KtxError> {
-    let rest = bytes.strip_prefix(&IDENTIFIER).ok_or(KtxError::Identifier)?;
-    let truncated = |what| KtxError::Truncated { what, end: bytes.len() };
-    let (words, _) = rest.first_chunk::<{ HEADER_BYTES - 12 }>().ok_or(truncated("the header"))?.as_chunks();
-    let word = |index: usize| u32::from_le_bytes(words[index]);
-    let format = Format::from_vk_format(word(0)).ok_or(KtxError::Format(word(0)))?;
-    let [width, height, faces] = [word(2), word(3), word(6)].map(|value| value as usize);
-    let plain =
-        [("depth", word(4), 0..=1), ("layer count", word(5), 0..=1), ("supercompression", word(8), 0..=0)];
-    for (what, actual, accepted) in plain {
-        if !accepted.contains(&actual) {
+    let header = read_header(bytes)?;
+    let format = Format::from_vk_format(header.vk_format).ok_or(KtxError::Format(header.vk_format))?;
+    let [width, height, faces] = [header.width, header.height, header.faces].map(|value| value as usize);
+    for (what, actual) in [("depth", header.depth), ("layer count", header.layers)] {
+        if actual > 1 {
             return Err(KtxError::Unsupported { what, actual });
         }
     }
     if !(faces == 1 || faces == 6 && width == height) {
-        return Err(KtxError::Unsupported { what: "face count", actual: word(6) });
+        return Err(KtxError::Unsupported { what: "face count", actual: header.faces });
     }
     if width == 0 || height == 0 {
         return Err(LayoutError::Empty { width, height }.into());
     }
-    let level_count = word(7).max(1) as usize;
-    if level_count > 32 {
-        return Err(KtxError::Unsupported { what: "level count", actual: word(7) });
-    }
-    let levels = (0..level_count)
-        .map(|level| read_level(bytes, level, format.level_bytes(width, height, faces, level)))
-        .collect::<Result<_, _>>()?;
-    let key_values = section(bytes, word(11).into(), word(12).into()).ok_or(truncated("key/value data"))?;
-    Ok(OwnedTexture { format, width, height, faces, levels, key_values: read_key_values(key_values) })
+    let level = |level: usize| {
+        let expected = format.level_bytes(width, height, faces, level).unwrap_or(usize::MAX);
+        Ok(level_bytes(bytes, &header, level, expected)?.into_owned())
+    };
+    let levels = (0..header.level_count.max(1) as usize).map(level).collect::<Result<_, KtxError>>()?;
+    Ok(OwnedTexture { format, width, height, faces, levels, key_values: key_values(bytes, &header)? })
 }
 
-fn read_level(bytes: &[u8], level: usize, expected: Option<usize>) -> Result<Vec<u8>, KtxError> {
+/// The bytes of one level, which must be `expected` many once they are decompressed. Memory grows with what they yield.
+pub(crate) fn level_bytes<'a>(
+    bytes: &'a [u8],
+    header: &Header,
+    level: usize,
+    expected: usize,
+) -> Result<Cow<'a, [u8]>, KtxError> {
     let truncated = |what| KtxError::Truncated { what, end: bytes.len() };
     let start = HEADER_BYTES + level * LEVEL_ENTRY_BYTES;
     let entry = bytes.get(start..start + LEVEL_ENTRY_BYTES).ok_or(truncated("the level index"))?;
     let (numbers, _) = entry.as_chunks();
-    let [offset, actual] = [0, 1].map(|index| u64::from_le_bytes(numbers[index]));
-    let expected = expected.map_or(u64::MAX, |bytes| bytes as u64);
+    let [offset, length, uncompressed] = [0, 1, 2].map(|index| u64::from_le_bytes(numbers[index]));
+    let (actual, is_compressed) = match header.supercompression {
+        NONE => (length, false),
+        ZSTANDARD => (uncompressed, true),
+        actual => return Err(KtxError::Unsupported { what: "supercompression scheme", actual }),
+    };
+    let expected = expected as u64;
     if actual != expected {
         return Err(KtxError::LevelSize { level, actual, expected });
     }
-    Ok(section(bytes, offset, actual).ok_or(truncated("level data"))?.to_vec())
+    let stored = section(bytes, offset, length).ok_or(truncated("level data"))?;
+    if !is_compressed {
+        return Ok(Cow::Borrowed(stored));
+    }
+    let damaged = |error: std::io::Error| KtxError::Zstandard { level, reason: error.to_string() };
+    let mut decoder = zstd::stream::read::Decoder::with_buffer(stored).map_err(damaged)?;
+    decoder.window_log_max(ZSTANDARD_WINDOW_LOG_MAX).map_err(damaged)?;
+    let mut out = Vec::new();
+    // One byte more, so that a longer level is seen.
+    decoder.take(expected.saturating_add(1)).read_to_end(&mut out).map_err(damaged)?;
+    if out.len() as u64 != expected {
+        return Err(KtxError::LevelSize { level, actual: out.len() as u64, expected });
+    }
+    Ok(Cow::Owned(out))
+}
+
+/// Key/value pairs in file order, as [`OwnedTexture::key_values`] has them.
+pub(crate) fn key_values(bytes: &[u8], header: &Header) -> Result<Vec<(String, String)>, KtxError> {
+    let [start, length] = header.key_values.map(u64::from);
+    let data = section(bytes, start, length);
+    Ok(read_key_values(data.ok_or(KtxError::Truncated { what: "key/value data", end: bytes.len() })?))
 }
 
 fn section(bytes: &[u8], offset: u64, length: u64) -> Option<&[u8]> {

@@ -8,7 +8,7 @@ use exr::{
         chunk::{Chunk, CompressedBlock, CompressedScanLineBlock, CompressedTileBlock, TileCoordinates},
     },
     math::Vec2,
-    meta::{BlockDescription, MetaData, attribute::SampleType, compute_block_count},
+    meta::{BlockDescription, MetaData, attribute::SampleType, compute_block_count, header::Header},
 };
 use half::f16;
 
@@ -55,7 +55,7 @@ pub(super) fn read_part(
 }
 
 /// A chunk's head, its bytes still in the file.
-struct Located {
+pub(super) struct Located {
     place: ChunkPlace,
     data: std::ops::Range<usize>,
 }
@@ -66,7 +66,7 @@ enum ChunkPlace {
 }
 
 /// Reads a chunk's head: part number (multi-part files), coordinates, byte count.
-fn locate_chunk(
+pub(super) fn locate_chunk(
     bytes: &[u8],
     meta: &MetaData,
     part: usize,
@@ -113,7 +113,14 @@ fn tile_coordinates([x, y, level_x, level_y]: [i32; 4]) -> Option<TileCoordinate
 }
 
 impl Located {
-    fn compressed(self, bytes: &[u8], part: usize) -> Chunk {
+    /// The row of the data window it starts at; `None` for tiles and rows outside.
+    pub(super) fn row(&self, header: &Header) -> Option<usize> {
+        let ChunkPlace::Row(y) = self.place else { return None };
+        let row = i64::from(y) - i64::from(header.data_window().position.1);
+        usize::try_from(row).ok().filter(|&row| row < header.layer_size.1)
+    }
+
+    pub(super) fn compressed(self, bytes: &[u8], part: usize) -> Chunk {
         let compressed_pixels_le = bytes[self.data].to_vec();
         let compressed_block = match self.place {
             ChunkPlace::Row(y_coordinate) => {
@@ -160,7 +167,7 @@ impl Target<'_> {
 }
 
 /// The crate hands samples over in native byte order.
-fn copy_samples<'a>(kind: SampleType, bytes: &[u8], texels: impl Iterator<Item = &'a mut f32>) {
+pub(super) fn copy_samples<'a>(kind: SampleType, bytes: &[u8], texels: impl Iterator<Item = &'a mut f32>) {
     match kind {
         SampleType::F16 => {
             let values = bytes.as_chunks().0.iter().map(|&b| f16::from_ne_bytes(b).to_f32());

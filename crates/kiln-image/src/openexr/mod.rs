@@ -2,18 +2,19 @@
 //! chunk bounds before anything is allocated, places the data window and converts colours.
 //!
 //! Read: scan lines and tiles (largest level), every compression of the crate, half, float and uint
-//! samples, RGB or luminance, luminance with chroma stored at full size. Not read: deep parts,
-//! subsampled chroma, HTJ2K.
+//! samples, RGB or luminance, luminance with chroma at full or half size. Not read: deep parts,
+//! half-size chroma in several parts or with B44, HTJ2K.
 //!
 //! Source: "OpenEXR File Layout" and "Technical Introduction to OpenEXR" (Academy Software Foundation).
 
 mod channels;
 mod chunks;
+mod subsampled;
 
 use crate::{
-    Bulk, Cancel, DecodeError, Decoded, Image, Limits,
-    colour::{self, Chromaticities},
-    decode::{check_size, guard, too_large},
+    Bulk, Cancel, DecodeError, Image, Layout, Limits,
+    colour::{self, Chromaticities, Gamut},
+    decode::{Source, check_size, guard, too_large},
 };
 use channels::ColourChannels;
 use exr::meta::{
@@ -33,22 +34,42 @@ const CHUNK_BYTES_MAX: usize = 1 << 30;
 ///
 /// # Errors
 /// [`DecodeError`] with part or chunk; [`DecodeError::Cancelled`] after the chunk in work.
-pub(crate) fn decode(bytes: &[u8], limits: &Limits, cancel: Cancel) -> Result<Decoded, DecodeError> {
+pub(crate) fn decode(bytes: &[u8], limits: &Limits, cancel: Cancel) -> Result<Source, DecodeError> {
     guard(FORMAT, || decode_unguarded(bytes, limits, cancel))
 }
 
-fn decode_unguarded(bytes: &[u8], limits: &Limits, cancel: Cancel) -> Result<Decoded, DecodeError> {
-    let (meta, chunk_tables_start) = read_meta(bytes)?;
+fn decode_unguarded(bytes: &[u8], limits: &Limits, cancel: Cancel) -> Result<Source, DecodeError> {
+    let full = subsampled::with_full_sampling(bytes);
+    let bytes = full.as_ref().map_or(bytes, |full| &full.bytes);
+    let (mut meta, chunk_tables_start) = read_meta(bytes)?;
+    if let Some(full) = &full {
+        subsampled::restore(&mut meta, &full.sampling)?;
+    }
     check_tables(&meta, bytes.len(), chunk_tables_start, limits)?;
     let (part, channels) = choose_part(&meta)?;
     let header = &meta.headers[part];
     check_part(header, limits)?;
 
     let mut notes = part_notes(&meta, part, &channels);
-    let mut rgb = chunks::read_part(bytes, &meta, part, chunk_tables_start, &channels, cancel)?;
-    convert_colour(header, &mut rgb, &channels, &mut notes, cancel)?;
+    let mut rgb = if subsampled::is_subsampled(header) {
+        subsampled::read_part(bytes, &meta, chunk_tables_start, &channels, cancel)?
+    } else {
+        chunks::read_part(bytes, &meta, part, chunk_tables_start, &channels, cancel)?
+    };
+    let gamut = convert_colour(header, &mut rgb, &channels, &mut notes, cancel)?;
     let image = place(header, rgb, limits, &mut notes, cancel)?;
-    Ok(Decoded { image, format: FORMAT, notes })
+    let declared = header.own_attributes.environment_map.map(|map| match map {
+        EnvironmentMap::LatitudeLongitude => Layout::Equirect,
+        EnvironmentMap::Cube => Layout::ExrCube,
+    });
+    let texel_aspect = texel_aspect(header);
+    Ok(Source { gamut, declared, texel_aspect, ..Source::flat(FORMAT, image, notes) })
+}
+
+/// Height of a texel over its width; pixelAspectRatio is the other way round, and 0 or no number says nothing.
+fn texel_aspect(header: &Header) -> f64 {
+    let aspect = f64::from(header.shared_attributes.pixel_aspect);
+    if aspect.is_finite() && aspect > 0.0 { 1.0 / aspect } else { 1.0 }
 }
 
 /// The validated headers, and the byte where the chunk offset tables start.
@@ -64,6 +85,11 @@ fn read_meta(bytes: &[u8]) -> Result<(MetaData, usize), DecodeError> {
 /// The crate's error in our words.
 fn explain(error: exr::error::Error, place: &str, end: usize) -> DecodeError {
     match error {
+        exr::error::Error::NotSupported(reason) if reason.contains("subsampling") => {
+            let reason =
+                "chroma subsampling (channels stored at half size) is not read; save the image as RGB";
+            DecodeError::Unsupported { format: FORMAT, reason: reason.to_owned() }
+        }
         exr::error::Error::NotSupported(reason) => {
             DecodeError::Unsupported { format: FORMAT, reason: reason.into_owned() }
         }
@@ -134,13 +160,6 @@ fn part_notes(meta: &MetaData, part: usize, channels: &ColourChannels) -> Vec<St
         let skipped = if deep > 0 { format!(", {deep} of them deep") } else { String::new() };
         notes.push(format!("part {part} ({name}) was taken, of {} parts{skipped}", meta.headers.len()));
     }
-    if header.own_attributes.environment_map == Some(EnvironmentMap::Cube) {
-        notes.push("the file says it is a cube map: six faces, stacked".to_owned());
-    }
-    if header.shared_attributes.pixel_aspect != 1.0 {
-        let aspect = header.shared_attributes.pixel_aspect;
-        notes.push(format!("pixelAspectRatio {aspect} has no effect: texels are taken as square"));
-    }
     notes
 }
 
@@ -159,7 +178,7 @@ fn convert_colour(
     channels: &ColourChannels,
     notes: &mut Vec<String>,
     cancel: Cancel,
-) -> Result<(), DecodeError> {
+) -> Result<Option<Gamut>, DecodeError> {
     let source = chromaticities(header).unwrap_or(colour::REC_709);
     let no_space =
         || invalid("chromaticities".to_owned(), format!("{:?} span no colour space", source.to_array()));
@@ -168,7 +187,7 @@ fn convert_colour(
         channels::undo_luminance_chroma(rgb, weights, cancel)?;
     }
     if channels.is_grey || source.is_close_to(colour::REC_709) {
-        return Ok(());
+        return Ok(None);
     }
     let matrix = if source.is_close_to(colour::CIE_XYZ) {
         // Tristimulus values are no RGB with a white of its own: nothing is adapted.
@@ -176,12 +195,16 @@ fn convert_colour(
     } else {
         colour::to_rec_709(source)
     };
-    colour::transform_texels(&matrix.ok_or_else(no_space)?, rgb, cancel)?;
+    let matrix = matrix.ok_or_else(no_space)?;
+    colour::transform_texels(&matrix, rgb, cancel)?;
     notes.push(format!("chromaticities {:?} were converted to Rec. 709", source.to_array()));
-    Ok(())
+    Ok(Some(Gamut::new(matrix).ok_or_else(no_space)?))
 }
 
 /// Puts the data window where the display window is; what was not stored is black.
+///
+/// An environment map is its data window, whatever is displayed (OpenEXR's ImfEnvmap), and so is an image of which
+/// nothing would be displayed.
 fn place(
     header: &Header,
     rgb: Bulk<Vec<f32>>,
@@ -195,12 +218,24 @@ fn place(
     if display == data {
         return Ok(Image::new(width, height, rgb.into_inner())?);
     }
+    if header.own_attributes.environment_map.is_some() {
+        notes.push(format!(
+            "the data window ({}) was taken as the environment map; the display window ({}) has no effect",
+            describe(data),
+            describe(display)
+        ));
+        return Ok(Image::new(width, height, rgb.into_inner())?);
+    }
     check_size(FORMAT, display.size.0, display.size.1, limits)?;
     let columns = Overlap::new(data.position.0, width, display.position.0, display.size.0);
     let rows = Overlap::new(data.position.1, height, display.position.1, display.size.1);
     if columns.length == 0 || rows.length == 0 {
-        let reason = format!("it lies outside the display window ({})", describe(display));
-        return Err(invalid(format!("data window ({})", describe(data)), reason));
+        notes.push(format!(
+            "the data window ({}) lies outside the display window ({}); it was taken alone",
+            describe(data),
+            describe(display)
+        ));
+        return Ok(Image::new(width, height, rgb.into_inner())?);
     }
     notes.push(format!(
         "the data window ({}) was placed in the display window ({}); the rest is black or cropped",

@@ -136,3 +136,70 @@ fn every_truncation_is_an_error() {
         assert!(!error.to_string().contains("gave up"), "{end} bytes made the decoder panic");
     }
 }
+
+/// An uncompressed EXR of 8 × 4 texels of luminance with chroma at half size, byte by byte: no writer makes one.
+pub(super) fn half_size_chroma() -> Vec<u8> {
+    let mut bytes = vec![0x76, 0x2f, 0x31, 0x01, 2, 0, 0, 0];
+    let mut attribute = |name: &str, kind: &str, value: &[u8]| {
+        bytes.extend(format!("{name}\0{kind}\0").bytes());
+        bytes.extend((value.len() as i32).to_le_bytes());
+        bytes.extend_from_slice(value);
+    };
+    let numbers = |values: &[i32]| values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>();
+    let mut channels = Vec::new();
+    for (name, rate) in [("BY", 2), ("RY", 2), ("Y", 1)] {
+        channels.extend(format!("{name}\0").bytes());
+        channels.extend(numbers(&[2, 0, rate, rate]));
+    }
+    channels.push(0);
+    attribute("channels", "chlist", &channels);
+    attribute("compression", "compression", &[0]);
+    attribute("dataWindow", "box2i", &numbers(&[0, 0, 7, 3]));
+    attribute("displayWindow", "box2i", &numbers(&[0, 0, 7, 3]));
+    attribute("lineOrder", "lineOrder", &[0]);
+    attribute("pixelAspectRatio", "float", &1.0_f32.to_le_bytes());
+    attribute("screenWindowCenter", "v2f", &[0; 8]);
+    attribute("screenWindowWidth", "float", &1.0_f32.to_le_bytes());
+    bytes.push(0);
+    let lines: Vec<Vec<f32>> = (0..4)
+        .map(|row| {
+            // Blue, then red chroma in even rows, rising from left to right; luminance 1 + row.
+            let chroma: Vec<f32> =
+                if row % 2 == 0 { vec![0.0, 0.0, 0.0, 0.0, 0.0, 0.5, 1.0, 1.5] } else { Vec::new() };
+            chroma.into_iter().chain([1.0 + row as f32; 8]).collect()
+        })
+        .collect();
+    let mut offset = (bytes.len() + 4 * 8) as u64;
+    for line in &lines {
+        bytes.extend(offset.to_le_bytes());
+        offset += 8 + 4 * line.len() as u64;
+    }
+    for (row, line) in lines.iter().enumerate() {
+        bytes.extend(numbers(&[row as i32, 4 * line.len() as i32]));
+        bytes.extend(line.iter().flat_map(|value| value.to_le_bytes()));
+    }
+    bytes
+}
+
+/// RY = (R − Y)/Y, between its samples the mean of both; the last column repeats.
+#[test]
+fn half_size_chroma_is_interpolated() {
+    let image = decode_default(&half_size_chroma()).expect("a sound file").image;
+    assert_eq!((image.width, image.height), (8, 4));
+    for (x, red) in [1.0, 1.25, 1.5, 1.75, 2.0, 2.25, 2.5, 2.5].into_iter().enumerate() {
+        for y in 0..4 {
+            let luminance = 1.0 + y as f32;
+            assert_eq!(image.texel(x, y)[0], red * luminance, "{x}, {y}");
+            assert_eq!(image.texel(x, y)[2], luminance);
+        }
+    }
+}
+
+#[test]
+fn data_window_outside_the_display_window_is_taken_alone() {
+    let outside = |attributes: &mut ImageAttributes| attributes.display_window.position = Vec2(50, 50);
+    let decoded = decode_default(&file([layer("main", &rgb([1.0, 2.0]))].into_iter().collect(), outside));
+    let decoded = decoded.expect("nothing of it would be displayed");
+    assert_eq!((decoded.image.width, decoded.image.texel(1, 0)), (2, [2.0; 3]));
+    assert!(decoded.notes[0].contains("lies outside the display window"), "{:?}", decoded.notes);
+}

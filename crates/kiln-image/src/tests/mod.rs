@@ -2,8 +2,11 @@
 
 mod cancel;
 mod colour;
+mod containers;
 mod corpus;
+mod corpus_environment;
 mod corpus_orientation;
+mod environment;
 mod exr_files;
 mod hdr;
 mod ktx2;
