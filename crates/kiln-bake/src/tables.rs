@@ -1,12 +1,7 @@
-//! Tables and laws that do not depend on an environment.
+//! Tables that do not depend on an environment.
 
 use kiln_sphere::{Cancel, Cancelled};
 use rayon::prelude::*;
-
-/// Perceptual roughness of mip `level` in a chain of `level_count`: level/(n − 1), 0 for a chain of one.
-pub fn roughness_of_level(level: usize, level_count: usize) -> f64 {
-    if level_count < 2 { 0.0 } else { level as f64 / (level_count - 1) as f64 }
-}
 
 /// Split-sum table of GGX: `size`² pairs (scale, bias), reflectance = F0 · scale + bias.
 ///

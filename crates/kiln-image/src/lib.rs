@@ -13,14 +13,18 @@
 //! Not here: what a map means (`kiln-bake`), directions and transforms (`kiln-sphere`), files (`kiln-project`).
 
 pub mod colour;
+pub mod cube_layout;
 mod decode;
+pub mod exr_write;
 pub mod hdr;
+pub mod ktx1;
 pub mod ktx2;
 mod layout;
 mod ldr;
 mod openexr;
 pub mod png;
 pub mod sheet;
+pub mod texel;
 mod texels;
 
 #[cfg(test)]

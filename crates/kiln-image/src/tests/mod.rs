@@ -4,13 +4,18 @@ mod cancel;
 mod colour;
 mod corpus;
 mod corpus_orientation;
+mod cube_layout;
 mod exr_files;
 mod hdr;
+mod ktx1;
 mod ktx2;
+mod ktx2_rules;
 mod layout;
 mod mutation;
 mod sheet;
+mod texel;
 mod texels;
+mod writers;
 
 use crate::{Cancel, DecodeError, Decoded, Image, Limits, TexelReport, decode};
 
