@@ -46,9 +46,9 @@ pub fn encode_radiance(image: &Image, exposure: f64, cancel: Cancel) -> Result<(
         for texel in row.chunks_exact(3) {
             let exposed = [texel[0], texel[1], texel[2]].map(|value| f64::from(value) * exposure);
             clamped += usize::from(!exposed.iter().all(|value| (0.0..=1.0).contains(value)));
-            rgb.extend(
-                exposed.map(|value| libm::round(linear_to_srgb(value.max(0.0).min(1.0)) * 255.0) as u8),
-            );
+            rgb.extend(exposed.map(|value| {
+                libm::round(linear_to_srgb(if value > 0.0 { value.min(1.0) } else { 0.0 }) * 255.0) as u8
+            }));
         }
     }
     let texels = (rgb.len() / 3).max(1);

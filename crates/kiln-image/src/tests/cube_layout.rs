@@ -26,7 +26,7 @@ fn directions() -> Vec<[f64; 3]> {
     let mut random = Random(7);
     let mut directions: Vec<[f64; 3]> = (0..2000)
         .map(|_| {
-            panorama_direction(random.unit(), libm::acos(1.0 - 2.0 * random.unit()) / 3.141_592_653_589_793)
+            panorama_direction(random.unit(), libm::acos(1.0 - 2.0 * random.unit()) / std::f64::consts::PI)
         })
         .collect();
     directions.extend([

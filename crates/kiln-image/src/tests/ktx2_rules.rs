@@ -138,7 +138,16 @@ fn violations(bytes: &[u8]) -> Vec<String> {
 
 const FORMATS: [u32; 10] = [37, 83, 90, 97, 103, 106, 109, 122, 123, 131];
 
-fn files() -> Vec<(Format, usize, Vec<Vec<u8>>, Vec<u8>, Vec<u8>)> {
+/// A texture written both ways.
+struct Files {
+    format: Format,
+    size: usize,
+    levels: Vec<Vec<u8>>,
+    plain: Vec<u8>,
+    zstd: Vec<u8>,
+}
+
+fn files() -> Vec<Files> {
     let mut files = Vec::new();
     for number in FORMATS {
         let format = Format::from_vk_format(number).expect("known");
@@ -159,7 +168,7 @@ fn files() -> Vec<(Format, usize, Vec<Vec<u8>>, Vec<u8>, Vec<u8>)> {
             let zstd = write_zstd(&texture, 3, Cancel::NEVER).expect("nobody cancels");
             let plain = write(&texture);
             drop(texture);
-            files.push((format, size, levels, plain, zstd));
+            files.push(Files { format, size, levels, plain, zstd });
         }
     }
     files
@@ -167,7 +176,7 @@ fn files() -> Vec<(Format, usize, Vec<Vec<u8>>, Vec<u8>, Vec<u8>)> {
 
 #[test]
 fn all_files_keep_the_rules_plain_and_compressed() {
-    for (format, size, _, plain, zstd) in files() {
+    for Files { format, size, plain, zstd, .. } in files() {
         assert_eq!(violations(&plain), [""; 0], "{format:?} {size}");
         assert_eq!(violations(&zstd), [""; 0], "{format:?} {size} zstd");
     }
@@ -175,7 +184,7 @@ fn all_files_keep_the_rules_plain_and_compressed() {
 
 #[test]
 fn a_changed_field_breaks_a_rule() {
-    let (_, _, _, plain, _) = &files()[3 * 4];
+    let plain = &files()[3 * 4].plain;
     // typeSize, faces, level count + 1 stays in range for none, descriptor model, plane bytes, sample length, level offset.
     for position in [16, 36, 80 + 24 * 5 + 12, 80 + 24 * 5 + 20, 80 + 24 * 5 + 30, 80, 81] {
         let mut damaged = plain.clone();
@@ -186,7 +195,7 @@ fn a_changed_field_breaks_a_rule() {
 
 #[test]
 fn compressed_levels_are_what_the_crate_sees_and_inflate_to_the_same_bytes() {
-    for (format, _, levels, _, zstd) in files() {
+    for Files { format, levels, zstd, .. } in files() {
         let reader = ktx2::Reader::new(&zstd).expect("the crate reads it");
         let header = reader.header();
         assert_eq!(header.supercompression_scheme, Some(ktx2::SupercompressionScheme::Zstandard));

@@ -44,7 +44,7 @@ pub fn encode_block(texels: &Texels) -> [u8; BLOCK_BYTES] {
 
 /// The middle of what the decoder turns into the half float nearest to a value.
 fn point(value: f32) -> f32 {
-    let half = f16::from_f32(value.max(0.0).min(MAX));
+    let half = f16::from_f32(if value > 0.0 { value.min(MAX) } else { 0.0 });
     (f32::from(half.to_bits()) + 0.5) * (64.0 / 31.0)
 }
 
