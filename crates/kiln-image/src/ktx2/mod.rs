@@ -97,7 +97,7 @@ impl Format {
             Format::R32G32B32A32_SFLOAT => 109,
             Format::B10G11R11_UFLOAT_PACK32 => 122,
             Format::E5B9G9R9_UFLOAT_PACK32 => 123,
-            Format::BC6H_UFLOAT_BLOCK => 131,
+            Format::BC6H_UFLOAT_BLOCK => 143,
         }
     }
 

@@ -58,6 +58,29 @@ fn every_format_comes_back_and_the_crate_agrees() {
 }
 
 #[test]
+fn format_numbers_are_those_that_vulkan_gives_the_names() {
+    // The crate's constants come from Vulkan's registry.
+    let named = [
+        (Format::R8G8B8A8_UNORM, ktx2::Format::R8G8B8A8_UNORM),
+        (Format::R16G16_SFLOAT, ktx2::Format::R16G16_SFLOAT),
+        (Format::R16G16B16_SFLOAT, ktx2::Format::R16G16B16_SFLOAT),
+        (Format::R16G16B16A16_SFLOAT, ktx2::Format::R16G16B16A16_SFLOAT),
+        (Format::R32G32_SFLOAT, ktx2::Format::R32G32_SFLOAT),
+        (Format::R32G32B32_SFLOAT, ktx2::Format::R32G32B32_SFLOAT),
+        (Format::R32G32B32A32_SFLOAT, ktx2::Format::R32G32B32A32_SFLOAT),
+        (Format::B10G11R11_UFLOAT_PACK32, ktx2::Format::B10G11R11_UFLOAT_PACK32),
+        (Format::E5B9G9R9_UFLOAT_PACK32, ktx2::Format::E5B9G9R9_UFLOAT_PACK32),
+        (Format::BC6H_UFLOAT_BLOCK, ktx2::Format::BC6H_UFLOAT_BLOCK),
+    ];
+    assert_eq!(named.map(|(ours, _)| ours), FORMATS);
+    for (ours, theirs) in named {
+        assert_eq!(ours.vk_format(), theirs.value(), "{ours:?}");
+        assert_eq!(Format::from_vk_format(theirs.value()), Some(ours));
+    }
+    assert_eq!(Format::from_vk_format(ktx2::Format::BC1_RGB_UNORM_BLOCK.value()), None, "the check itself");
+}
+
+#[test]
 fn descriptor_says_linear_rec_709_signed_floats() {
     let levels = level_data(Format::R16G16B16A16_SFLOAT, 4, 6);
     let bytes = write(&texture(Format::R16G16B16A16_SFLOAT, 4, 6, &levels));
