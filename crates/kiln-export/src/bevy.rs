@@ -16,9 +16,9 @@ use kiln_image::cube_layout::Mirror;
 
 pub(crate) fn package(
     environment: &BakedEnvironment,
+    format: TexelFormat,
     cancel: Cancel,
 ) -> Result<Vec<ExportFile>, ExportError> {
-    let format = TexelFormat::Rgb9e5Ufloat;
     let scale_log2 = scale_for(environment, format);
     let style = CubeStyle { format, mirror: Some(Mirror::Z), container: Container::Ktx2Zstd, scale_log2 };
     let name = |map: &str| format!("{}_{map}.ktx2", environment.name);

@@ -30,14 +30,7 @@ impl CubeFacts {
         let container = match self.container {
             Container::Ktx2 => "KTX2",
             Container::Ktx2Zstd => "KTX2 with Zstandard",
-            Container::Ktx1Filament => "KTX1, glType 0x8C3A as Filament reads it",
-        };
-        let format = match self.format {
-            TexelFormat::Rgba16Float => "RGBA16F",
-            TexelFormat::Rgba32Float => "RGBA32F",
-            TexelFormat::Rgb9e5Ufloat => "RGB9E5",
-            TexelFormat::R11g11b10Ufloat => "R11F_G11F_B10F",
-            TexelFormat::Bc6hUfloat => "BC6H_UFLOAT",
+            Container::Ktx1Filament => "KTX1 as Filament reads it",
         };
         let lookup = match self.mirror {
             None => "direction (x, y, z)",
@@ -50,7 +43,7 @@ impl CubeFacts {
             "path": path,
             "holds": holds,
             "container": container,
-            "format": format,
+            "format": format_name(self.format),
             "face_size": self.face_size,
             "levels": self.errors.len(),
             "faces": "+X -X +Y -Y +Z -Z",
@@ -61,6 +54,17 @@ impl CubeFacts {
                 "clamped_flux": each(|error| error.clamped_flux),
             },
         })
+    }
+}
+
+/// A format's name in files and messages.
+pub(crate) fn format_name(format: TexelFormat) -> &'static str {
+    match format {
+        TexelFormat::Rgba16Float => "RGBA16F",
+        TexelFormat::Rgba32Float => "RGBA32F",
+        TexelFormat::Rgb9e5Ufloat => "RGB9E5",
+        TexelFormat::R11g11b10Ufloat => "R11F_G11F_B10F",
+        TexelFormat::Bc6hUfloat => "BC6H_UFLOAT",
     }
 }
 

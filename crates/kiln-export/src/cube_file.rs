@@ -25,7 +25,7 @@ pub(crate) struct CubeStyle {
 pub(crate) enum Container {
     Ktx2,
     Ktx2Zstd,
-    /// KTX 1 with the packed floats that Filament reads.
+    /// KTX 1 with the packed or half floats that Filament reads.
     Ktx1Filament,
 }
 
@@ -63,7 +63,10 @@ pub(crate) fn cube_file<'a>(
         let levels: Vec<&[u8]> = encoded.iter().map(|level| level.bytes.as_slice()).collect();
         match style.container {
             Container::Ktx1Filament => {
-                let format = ktx1::Format::R11fG11fB10fFilament;
+                let format = match style.format {
+                    TexelFormat::R11g11b10Ufloat => ktx1::Format::R11fG11fB10fFilament,
+                    _ => ktx1::Format::Rgba16f,
+                };
                 ktx1::write_cube(&ktx1::Cube { format, face_size, levels, key_values })
             }
             Container::Ktx2 | Container::Ktx2Zstd => {

@@ -20,9 +20,9 @@ use std::fmt::Write;
 
 pub(crate) fn package(
     environment: &BakedEnvironment,
+    format: TexelFormat,
     cancel: Cancel,
 ) -> Result<Vec<ExportFile>, ExportError> {
-    let format = TexelFormat::R11g11b10Ufloat;
     let scale_log2 = scale_for(environment, format);
     let style = CubeStyle { format, mirror: None, container: Container::Ktx1Filament, scale_log2 };
     // The engine's intensity multiplies texture and harmonics alike, so both carry the scale.

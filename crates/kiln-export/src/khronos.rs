@@ -17,9 +17,9 @@ use serde_json::json;
 
 pub(crate) fn package(
     environment: &BakedEnvironment,
+    format: TexelFormat,
     cancel: Cancel,
 ) -> Result<Vec<ExportFile>, ExportError> {
-    let format = TexelFormat::Rgba16Float;
     let scale_log2 = scale_for(environment, format);
     let style = CubeStyle { format, mirror: None, container: Container::Ktx2, scale_log2 };
     let name = |map: &str| format!("{}_{map}.ktx2", environment.name);

@@ -27,6 +27,7 @@ pub use environment::{BakedEnvironment, DfgTable};
 pub use kiln_sphere::{Cancel, Cancelled};
 pub use preset::{FACE_SIZE_DEFAULT, Preset, UnknownPreset, Wish};
 
+use kiln_bake::TexelFormat;
 use thiserror::Error;
 
 /// One file of a set.
@@ -80,6 +81,14 @@ pub enum ExportError {
         /// The law's name.
         law: &'static str,
     },
+    /// A texel format that the engine does not read.
+    #[error("{preset} does not take {format}; it takes {}", formats_of(preset))]
+    Format {
+        /// The preset.
+        preset: Preset,
+        /// The format's name.
+        format: &'static str,
+    },
     /// A table whose entries do not fill its size.
     #[error("a BRDF table of size {size} needs {} entries, {actual} were given", size * size)]
     Table {
@@ -103,22 +112,45 @@ pub enum ExportError {
     Cancelled(#[from] Cancelled),
 }
 
-/// The engine's files, `conventions.json` last. Equal environments give equal bytes.
+fn formats_of(preset: &Preset) -> String {
+    let names: Vec<&str> = preset.formats().iter().map(|&format| conventions::format_name(format)).collect();
+    if names.is_empty() { "none, it reads .hdr and .exr".to_owned() } else { names.join(", ") }
+}
+
+/// The engine's files in its usual texel format, see [`package_as`].
 ///
 /// # Errors
-/// [`ExportError`] where `environment` is not what [`Preset::wish`] asks for; [`ExportError::Cancelled`] within a row's
-/// work or the compression of one level.
+/// As [`package_as`].
 pub fn package(
     preset: Preset,
     environment: &BakedEnvironment,
     cancel: Cancel,
 ) -> Result<Vec<ExportFile>, ExportError> {
+    package_as(preset, environment, None, cancel)
+}
+
+/// The engine's files, `conventions.json` last; cubes in `format`, or in the first of [`Preset::formats`]. Equal environments give equal bytes.
+///
+/// # Errors
+/// [`ExportError`] where `environment` is not what [`Preset::wish`] asks for; [`ExportError::Cancelled`] within a row's
+/// work or the compression of one level.
+pub fn package_as(
+    preset: Preset,
+    environment: &BakedEnvironment,
+    format: Option<TexelFormat>,
+    cancel: Cancel,
+) -> Result<Vec<ExportFile>, ExportError> {
     environment.check(preset)?;
+    if let Some(format) = format.filter(|format| !preset.formats().contains(format)) {
+        return Err(ExportError::Format { preset, format: conventions::format_name(format) });
+    }
+    let usual = preset.formats().first().copied().unwrap_or(TexelFormat::Rgba32Float);
+    let format = format.unwrap_or(usual);
     match preset {
-        Preset::Bevy => bevy::package(environment, cancel),
+        Preset::Bevy => bevy::package(environment, format, cancel),
         Preset::Three => three::package(environment, cancel),
-        Preset::Filament => filament::package(environment, cancel),
-        Preset::Khronos => khronos::package(environment, cancel),
-        Preset::Raw => raw::package(environment, cancel),
+        Preset::Filament => filament::package(environment, format, cancel),
+        Preset::Khronos => khronos::package(environment, format, cancel),
+        Preset::Raw => raw::package(environment, format, cancel),
     }
 }

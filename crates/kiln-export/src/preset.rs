@@ -1,6 +1,6 @@
 //! The engines and what each wants baked.
 
-use kiln_bake::RoughnessLaw;
+use kiln_bake::{RoughnessLaw, TexelFormat};
 use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
@@ -65,6 +65,21 @@ impl Preset {
             Preset::Filament => "filament",
             Preset::Khronos => "khronos",
             Preset::Raw => "raw",
+        }
+    }
+
+    /// Texel formats of cubes that the engine reads, the usual one first; none where it takes `.hdr` and `.exr`.
+    ///
+    /// Bevy samples whatever wgpu filters (BC6H needs `TEXTURE_COMPRESSION_BC`, binary32 `FLOAT32_FILTERABLE`);
+    /// Filament's KTX 1 reader takes packed and half floats alike; Khronos' renderer asks WebGL for half and full floats.
+    pub fn formats(self) -> &'static [TexelFormat] {
+        use TexelFormat::{Bc6hUfloat, R11g11b10Ufloat, Rgb9e5Ufloat, Rgba16Float, Rgba32Float};
+        match self {
+            Preset::Bevy => &[Rgb9e5Ufloat, Rgba16Float, Bc6hUfloat, Rgba32Float],
+            Preset::Three => &[],
+            Preset::Filament => &[R11g11b10Ufloat, Rgba16Float],
+            Preset::Khronos => &[Rgba16Float, Rgba32Float],
+            Preset::Raw => &[Rgba32Float, Rgba16Float, Rgb9e5Ufloat, R11g11b10Ufloat, Bc6hUfloat],
         }
     }
 

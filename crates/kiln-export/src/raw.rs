@@ -1,7 +1,7 @@
-//! Raw: everything Kiln has, unrounded, in its own conventions.
+//! Raw: everything Kiln has in its own conventions, unrounded unless another format is asked for.
 
 use crate::conventions::{conventions, with_law};
-use crate::cube_file::{Container, CubeStyle, cube_file};
+use crate::cube_file::{Container, CubeStyle, cube_file, scale_for};
 use crate::{BakedEnvironment, Cancel, ExportError, ExportFile, Preset};
 use kiln_bake::TexelFormat;
 use kiln_image::cube_layout::equirect;
@@ -10,14 +10,11 @@ use serde_json::json;
 
 pub(crate) fn package(
     environment: &BakedEnvironment,
+    format: TexelFormat,
     cancel: Cancel,
 ) -> Result<Vec<ExportFile>, ExportError> {
-    let style = CubeStyle {
-        format: TexelFormat::Rgba32Float,
-        mirror: None,
-        container: Container::Ktx2,
-        scale_log2: 0,
-    };
+    let scale_log2 = scale_for(environment, format);
+    let style = CubeStyle { format, mirror: None, container: Container::Ktx2, scale_log2 };
     let name = |map: &str| format!("{}_{map}", environment.name);
     let law = Preset::Raw.law();
     let (mut files, mut facts) = (Vec::new(), Vec::new());
@@ -85,7 +82,10 @@ pub(crate) fn package(
         }));
         files.push(ExportFile { path: "lut_ggx.ktx2".to_owned(), bytes: ktx2::write(&texture) });
     }
-    let notes = [("lookup", "cubes as Vulkan samples them, direction (x, y, z)")];
-    files.push(conventions(Preset::Raw, environment, 0, facts, &notes));
+    let notes = [
+        ("lookup", "cubes as Vulkan samples them, direction (x, y, z)"),
+        ("multiply_by", "holds for KTX2 cubes; EXR files, harmonics and tables are not scaled"),
+    ];
+    files.push(conventions(Preset::Raw, environment, scale_log2, facts, &notes));
     Ok(files)
 }

@@ -1,7 +1,8 @@
 //! Environments that are not what a preset asks for, and work that nobody wants any more.
 
 use super::synthetic::environment;
-use crate::{BakedEnvironment, Cancel, ExportError, FACE_SIZE_DEFAULT, Preset, package};
+use crate::{BakedEnvironment, Cancel, ExportError, FACE_SIZE_DEFAULT, Preset, package, package_as};
+use kiln_bake::TexelFormat;
 use kiln_image::{Cancelled, Cube};
 use std::sync::atomic::AtomicI64;
 
@@ -45,6 +46,36 @@ fn wrong_sizes_and_laws_are_refused_with_their_level() {
         refused(Preset::Bevy, |e| e.specular[2].0 = f64::NAN),
         ExportError::Roughness { level: 2, .. }
     ));
+}
+
+#[test]
+fn each_engine_takes_its_formats_and_refuses_others() {
+    for preset in Preset::ALL {
+        let environment = environment(preset, 1.0);
+        for format in TexelFormat::ALL {
+            let files = package_as(preset, &environment, Some(format), Cancel::NEVER);
+            if !preset.formats().contains(&format) {
+                let refused = files.expect_err("not a format of the engine").to_string();
+                assert!(refused.starts_with(&format!("{preset} does not take ")), "{refused}");
+                continue;
+            }
+            let files = files.expect("a format of the engine");
+            for file in
+                files.iter().filter(|file| file.path.ends_with(".ktx2") && file.path.starts_with("studio"))
+            {
+                let header = ktx2::Reader::new(&file.bytes).expect("the crate reads it").header();
+                assert_eq!(
+                    header.format.map(|f| f.value()),
+                    Some(format.ktx2().vk_format()),
+                    "{preset} {}",
+                    file.path
+                );
+            }
+        }
+        let usual = preset.formats().first().copied();
+        let files = package(preset, &environment, Cancel::NEVER).expect("complete");
+        assert_eq!(package_as(preset, &environment, usual, Cancel::NEVER), Ok(files));
+    }
 }
 
 #[test]
