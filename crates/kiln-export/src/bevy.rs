@@ -5,8 +5,8 @@
 //!   so we negate the Z coordinate"); the level is `perceptual_roughness · (textureNumLevels − 1)`; the diffuse sample
 //!   is multiplied by the diffuse colour without 1/π, so it is E/π; `intensity` multiplies both.
 //! - crates/bevy_core_pipeline/src/skybox/skybox.wgsl: the sky is read at (x, y, −z) too, times `brightness`.
-//! - assets/environment_maps/*_rgb9e5_zstd.ktx2: Bevy's own maps are RGB9E5 in KTX2 with Zstandard, which its features
-//!   `ktx2` and `zstd` load and every GPU filters.
+//! - assets/environment_maps/*_rgb9e5_zstd.ktx2: Bevy's own maps are RGB9E5 in KTX2 with Zstandard, which its
+//!   features for the two load and every GPU filters.
 
 use crate::conventions::{conventions, with_law};
 use crate::cube_file::{Container, CubeStyle, cube_file, scale_for};
@@ -47,7 +47,7 @@ pub(crate) fn package(
             "mirror",
             "Bevy reads cubes at (x, y, -z); the texels are mirrored so that directions come out right",
         ),
-        ("features", "needs Bevy's features ktx2 and zstd_rust or zstd_c (zstd before 0.17)"),
+        ("features", "needs Bevy's Cargo features for KTX2 and Zstandard"),
     ];
     let conventions = conventions(Preset::Bevy, environment, scale_log2, facts, &notes);
     Ok(vec![diffuse, specular, skybox, conventions])

@@ -7,7 +7,8 @@
 //! - libs/ktxreader/src/Ktx1Reader.cpp: which `glType` it takes (see [`kiln_image::ktx1::Format`]);
 //!   libs/image/src/Ktx1Bundle.cpp, `getSphericalHarmonics`: 27 numbers by `strtof`.
 //! - shaders/src/surface_light_indirect.fs: `lod = iblRoughnessOneLevel · r · (2 − r)`, directions are looked up as they
-//!   are, irradiance is the polynomial of [`crate::sh::filament`]; filament/src/materials/skybox.mat reads level 0.
+//!   are, irradiance is the polynomial of [`crate::sh::filament`]. filament/src/materials/skybox.mat looks the sky up as it
+//!   is; it is seen magnified, so one level is enough.
 //! - cmgen itself turns a panorama by 180° about Y against Kiln's world (`CubemapUtils::equirectangularToCubemap` and
 //!   the mirror that follows put its centre at +Z). Kiln keeps its own world.
 
@@ -45,7 +46,7 @@ pub(crate) fn package(
             &Preset::Filament.law(),
             chain,
         ),
-        skybox_facts.json(&skybox.path, "radiance, for Skybox; level 0 only, as Filament reads it"),
+        skybox_facts.json(&skybox.path, "radiance, for Skybox; level 0 only: a sky is seen magnified"),
         json!({
             "path": text.path,
             "holds": "the same harmonics as cmgen prints them",
