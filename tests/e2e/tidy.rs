@@ -7,12 +7,13 @@ use std::process::Command;
 use serde_json::Value;
 
 /// From the bottom to the top: a crate may use those before it.
-const LAYERS: [&str; 15] = [
+const LAYERS: [&str; 16] = [
     "kiln-diagnostic",
     "kiln-sphere",
     "kiln-brdf",
     "kiln-image",
     "kiln-bake",
+    "kiln-export",
     "kiln-gpu",
     "kiln-shader",
     "kiln-scene",
@@ -26,7 +27,8 @@ const LAYERS: [&str; 15] = [
 ];
 
 /// Crates that see bytes and values only.
-const CORE: [&str; 6] = ["kiln-sphere", "kiln-brdf", "kiln-image", "kiln-bake", "kiln-shader", "kiln-scene"];
+const CORE: [&str; 7] =
+    ["kiln-sphere", "kiln-brdf", "kiln-image", "kiln-bake", "kiln-export", "kiln-shader", "kiln-scene"];
 const IO: [&str; 8] = [
     "std::fs",
     "std::net",

@@ -62,9 +62,10 @@ pub fn analyse(
         rgb.extend_from_slice(row);
     }
     let whole = sums(width, height, &rgb, cancel)?;
-    let bright = take_brightest(width, height, &mut rgb, &whole, cancel)?;
+    let need = Need::new(request, whole.mean(), whole.variance(), cancel)?;
+    let bright = take_brightest(width, height, &mut rgb, &whole, &need, cancel)?;
     let rest = if bright.is_empty() { whole.clone() } else { sums(width, height, &rgb, cancel)? };
-    let band_limit = choose_band_limit(request, whole.mean(), rest.variance(), cancel)?;
+    let band_limit = need.band_limit(rest.variance());
     let dim = kiln_sphere::analyse(width, height, &rgb, band_limit, cancel)?;
     let mut low = dim.truncated(LOW_BAND_LIMIT);
     if !bright.is_empty() {
@@ -174,33 +175,49 @@ fn square(rgb: [f64; 3]) -> f64 {
     rgb.iter().map(|value| value * value).sum()
 }
 
-pub(crate) fn choose_band_limit(
-    request: &AnalysisRequest,
-    mean: [f64; 3],
-    variance: f64,
-    cancel: Cancel,
-) -> Result<usize, Cancelled> {
-    if variance <= 0.0 {
-        return Ok(LOW_BAND_LIMIT);
-    }
-    let allowed = 0.5 * request.error * (square(mean) / variance).sqrt();
-    let sheen = request.sheen_alpha_min.map(|alpha| Lobe::Charlie { alpha });
-    let mut band_limit = LOW_BAND_LIMIT;
-    for lobe in [Lobe::Ggx { alpha: request.alpha_min }].into_iter().chain(sheen) {
-        band_limit = band_limit.max(last_above(crate::prefilter::usable(lobe), allowed, cancel)?);
-    }
-    Ok(band_limit)
+/// How many degrees a request needs, by the variance of what is transformed.
+pub(crate) struct Need {
+    /// error/2 · mean.
+    error: f64,
+    /// The lobes' spectra, as far as the whole environment needs them.
+    spectra: Vec<Vec<f64>>,
 }
 
-/// The last degree at which a lobe's spectrum is above `allowed`, at most [`BAND_LIMIT_MAX`].
-fn last_above(lobe: Lobe, allowed: f64, cancel: Cancel) -> Result<usize, Cancelled> {
+impl Need {
+    pub(crate) fn new(
+        request: &AnalysisRequest,
+        mean: [f64; 3],
+        variance_max: f64,
+        cancel: Cancel,
+    ) -> Result<Need, Cancelled> {
+        let error = 0.5 * request.error * square(mean).sqrt();
+        let allowed = error / variance_max.sqrt();
+        let sheen = request.sheen_alpha_min.map(|alpha| Lobe::Charlie { alpha });
+        let lobes = [Lobe::Ggx { alpha: request.alpha_min }].into_iter().chain(sheen);
+        let spectra = lobes.map(|lobe| spectrum_above(crate::prefilter::usable(lobe), allowed, cancel));
+        Ok(Need { error, spectra: spectra.collect::<Result<_, _>>()? })
+    }
+
+    /// The smallest L with max_{l > L} |κ_l| √variance ≤ error/2 · mean.
+    pub(crate) fn band_limit(&self, variance: f64) -> usize {
+        if variance <= 0.0 {
+            return LOW_BAND_LIMIT;
+        }
+        let allowed = self.error / variance.sqrt();
+        let last = |kappa: &Vec<f64>| kappa.iter().rposition(|k| k.abs() > allowed || allowed.is_nan());
+        self.spectra.iter().filter_map(last).fold(LOW_BAND_LIMIT, usize::max)
+    }
+}
+
+/// A lobe's spectrum up to where it stays below `allowed`, at most [`BAND_LIMIT_MAX`].
+fn spectrum_above(lobe: Lobe, allowed: f64, cancel: Cancel) -> Result<Vec<f64>, Cancelled> {
     // A spectrum costs its length squared; one that stays below for half of it does not come back.
     let mut limit = 255;
     loop {
         let kappa = lobe.kernel(limit, cancel)?.kappa;
         let last = kappa.iter().rposition(|k| k.abs() > allowed || allowed.is_nan()).unwrap_or(0);
         if limit == BAND_LIMIT_MAX || 2 * last < limit {
-            return Ok(last);
+            return Ok(kappa);
         }
         limit = (2 * limit + 1).min(BAND_LIMIT_MAX);
     }

@@ -172,8 +172,3 @@ pub fn dfg_table(size: usize, cancel: Cancel) -> Result<Vec<[f32; 2]>, Cancelled
     let values = table(Table::GgxScaleBias(Masking::SmithCorrelated), TableAxes::Uniform, size, cancel)?;
     Ok(values.as_chunks().0.to_vec())
 }
-
-/// Perceptual roughness of mip `level` in a chain of `level_count`: level/(n − 1), 0 for a chain of one.
-pub fn roughness_of_level(level: usize, level_count: usize) -> f64 {
-    if level_count < 2 { 0.0 } else { level as f64 / (level_count - 1) as f64 }
-}

@@ -2,6 +2,7 @@
 
 mod cancelled_step_ends_soon;
 mod dering;
+mod encodings;
 mod environments;
 mod measure;
 mod recipes;

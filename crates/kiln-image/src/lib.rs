@@ -14,15 +14,19 @@
 
 pub mod colour;
 mod container;
+pub mod cube_layout;
 mod decode;
 mod environment;
+pub mod exr_write;
 pub mod hdr;
+pub mod ktx1;
 pub mod ktx2;
 mod layout;
 mod ldr;
 mod openexr;
 pub mod png;
 pub mod sheet;
+pub mod texel;
 mod texels;
 
 #[cfg(test)]

@@ -310,7 +310,7 @@ impl Encode {
         let (format, scale_log2) = match (env.format, env.range) {
             (TexelFormat::Rgba32Float, _) => (TexelFormat::Rgba32Float, 0),
             (TexelFormat::Rgba16Float, Range::F32) if scale_log2 > 0 => (TexelFormat::Rgba32Float, 0),
-            (TexelFormat::Rgba16Float, _) => (TexelFormat::Rgba16Float, scale_log2),
+            (format, _) => (format, scale_log2),
         };
         Encode { format, scale_log2, max: report.max }
     }
@@ -420,6 +420,9 @@ pub(crate) fn format_name(format: TexelFormat) -> &'static str {
     match format {
         TexelFormat::Rgba16Float => "rgba16f",
         TexelFormat::Rgba32Float => "rgba32f",
+        TexelFormat::Rgb9e5Ufloat => "rgb9e5",
+        TexelFormat::R11g11b10Ufloat => "r11g11b10",
+        TexelFormat::Bc6hUfloat => "bc6h",
     }
 }
 

@@ -160,10 +160,8 @@ fn extreme_alphas_are_finite() {
 #[test]
 fn impossible_error_is_capped_and_said() {
     let request = AnalysisRequest { alpha_min: 0.0, sheen_alpha_min: None, error: 0.0 };
-    assert_eq!(
-        crate::analysis::choose_band_limit(&request, [1.0; 3], 20.0, Cancel::NEVER),
-        Ok(crate::BAND_LIMIT_MAX)
-    );
+    let need = crate::analysis::Need::new(&request, [1.0; 3], 20.0, Cancel::NEVER).expect("nobody cancels");
+    assert_eq!(need.band_limit(20.0), crate::BAND_LIMIT_MAX);
     let analysis =
         analyse(&random(32, 16, 3), &AnalysisRequest { alpha_min: 0.25, sheen_alpha_min: None, error: 1e-3 });
     let sharper = specular_level(&analysis, 0.001, 2);

@@ -40,7 +40,9 @@ pub enum KtxError {
         end: usize,
     },
     /// Another texel format.
-    #[error("VkFormat {0} is not read; 16- and 32-bit float formats with 2 to 4 channels are")]
+    #[error(
+        "VkFormat {0} is not read; float formats with 2 to 4 channels, RGB9E5, R11G11B10, BC6H and RGBA8 are"
+    )]
     Format(u32),
     /// Well-formed, but no plain 2D or cube texture.
     #[error("{what} {actual} is not read")]
@@ -244,7 +246,10 @@ impl OwnedTexture {
 
     fn rgb(&self, level: usize, faces: usize) -> Result<Vec<f32>, KtxError> {
         let bytes = self.levels.get(level).filter(|_| self.faces == faces);
-        let values = self.format.decode(bytes.ok_or(KtxError::NoSuchLevel { level, faces })?);
+        let bytes = bytes.ok_or(KtxError::NoSuchLevel { level, faces })?;
+        let (width, height) = ((self.width >> level).max(1), (self.height >> level).max(1));
+        let values =
+            self.format.decode_image(width, height, bytes).ok_or(KtxError::NoSuchLevel { level, faces })?;
         let texels = values.chunks_exact(self.format.channels());
         Ok(texels.flat_map(|texel| [texel[0], texel[1], texel.get(2).copied().unwrap_or(0.0)]).collect())
     }

@@ -3,13 +3,17 @@
 use super::{Random, corpus};
 use crate::ktx2::{Format, KtxError, Texture, read, write};
 
-const FORMATS: [Format; 6] = [
+const FORMATS: [Format; 10] = [
+    Format::R8G8B8A8_UNORM,
     Format::R16G16_SFLOAT,
     Format::R16G16B16_SFLOAT,
     Format::R16G16B16A16_SFLOAT,
     Format::R32G32_SFLOAT,
     Format::R32G32B32_SFLOAT,
     Format::R32G32B32A32_SFLOAT,
+    Format::B10G11R11_UFLOAT_PACK32,
+    Format::E5B9G9R9_UFLOAT_PACK32,
+    Format::BC6H_UFLOAT_BLOCK,
 ];
 
 fn level_data(format: Format, size: usize, faces: usize) -> Vec<Vec<u8>> {
@@ -47,10 +51,33 @@ fn every_format_comes_back_and_the_crate_agrees() {
                 std::num::NonZeroU32::new(format.vk_format()).map(|v| v.get())
             );
             assert_eq!((header.pixel_width, header.face_count as usize), (size as u32, faces));
-            assert_eq!(header.type_size as usize, format.channel_bytes());
+            assert_eq!(header.type_size as usize, format.type_size());
             assert!(reader.levels().map(|level| level.data.to_vec()).eq(levels));
         }
     }
+}
+
+#[test]
+fn format_numbers_are_those_that_vulkan_gives_the_names() {
+    // The crate's constants come from Vulkan's registry.
+    let named = [
+        (Format::R8G8B8A8_UNORM, ktx2::Format::R8G8B8A8_UNORM),
+        (Format::R16G16_SFLOAT, ktx2::Format::R16G16_SFLOAT),
+        (Format::R16G16B16_SFLOAT, ktx2::Format::R16G16B16_SFLOAT),
+        (Format::R16G16B16A16_SFLOAT, ktx2::Format::R16G16B16A16_SFLOAT),
+        (Format::R32G32_SFLOAT, ktx2::Format::R32G32_SFLOAT),
+        (Format::R32G32B32_SFLOAT, ktx2::Format::R32G32B32_SFLOAT),
+        (Format::R32G32B32A32_SFLOAT, ktx2::Format::R32G32B32A32_SFLOAT),
+        (Format::B10G11R11_UFLOAT_PACK32, ktx2::Format::B10G11R11_UFLOAT_PACK32),
+        (Format::E5B9G9R9_UFLOAT_PACK32, ktx2::Format::E5B9G9R9_UFLOAT_PACK32),
+        (Format::BC6H_UFLOAT_BLOCK, ktx2::Format::BC6H_UFLOAT_BLOCK),
+    ];
+    assert_eq!(named.map(|(ours, _)| ours), FORMATS);
+    for (ours, theirs) in named {
+        assert_eq!(ours.vk_format(), theirs.value(), "{ours:?}");
+        assert_eq!(Format::from_vk_format(theirs.value()), Some(ours));
+    }
+    assert_eq!(Format::from_vk_format(ktx2::Format::BC1_RGB_UNORM_BLOCK.value()), None, "the check itself");
 }
 
 #[test]
@@ -88,7 +115,7 @@ fn levels_are_aligned_and_the_smallest_stands_first() {
             u64::from_le_bytes(bytes[start..start + 8].try_into().expect("eight bytes")) as usize
         };
         for level in 0..levels.len() {
-            assert!(offset(level).is_multiple_of(format.texel_bytes()) && offset(level).is_multiple_of(4));
+            assert!(offset(level).is_multiple_of(format.block_bytes()) && offset(level).is_multiple_of(4));
             assert!(level == 0 || offset(level) < offset(level - 1));
         }
     }

@@ -6,14 +6,19 @@ mod containers;
 mod corpus;
 mod corpus_environment;
 mod corpus_orientation;
+mod cube_layout;
 mod environment;
 mod exr_files;
 mod hdr;
+mod ktx1;
 mod ktx2;
+mod ktx2_rules;
 mod layout;
 mod mutation;
 mod sheet;
+mod texel;
 mod texels;
+mod writers;
 
 use crate::{Cancel, DecodeError, Decoded, Image, Limits, TexelReport, decode};
 
