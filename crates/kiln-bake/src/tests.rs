@@ -1,6 +1,7 @@
 //! The recipes against closed forms, symmetries and brute force.
 
 mod cancelled_step_ends_soon;
+mod cubes;
 mod dering;
 mod encodings;
 mod environments;

@@ -132,10 +132,30 @@ fn irradiance() {
 #[test]
 fn skybox_levels() {
     let map = panorama();
-    // Pieces between meridians: of the four side faces together, and of each cap.
-    check(3 * 2048, |cancel| {
+    // Pieces between meridians of the four side faces together; texels and columns of a cap's quadrant.
+    check(2048 + 32 * 512, |cancel| {
         Some(crate::skybox(&map, 64, cancel).ok()?.iter().flat_map(|level| bytes(&level.rgb)).collect())
     });
+}
+
+#[test]
+fn panorama_of_cube() {
+    let cube = skybox(&random(64, 32, 4), 128).remove(0);
+    // Columns and pieces of the side faces, columns and rows of a cap's quadrant, rows.
+    check(512 + 128 * 64 + 256, |cancel| {
+        Some(bytes(crate::panorama_of_cube(&cube, cancel).ok()?.rgb()))
+    });
+}
+
+#[test]
+fn skybox_of_cube_levels() {
+    let cube = skybox(&random(64, 32, 4), 128).remove(0);
+    for (face_size, checks) in [(128, 2 * 6 * 63), (48, 512 + 128 * 64)] {
+        check(checks, |cancel| {
+            let levels = crate::skybox_of_cube(&cube, face_size, cancel).ok()?;
+            Some(levels.iter().flat_map(|level| bytes(&level.rgb)).collect())
+        });
+    }
 }
 
 #[test]

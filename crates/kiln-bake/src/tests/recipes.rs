@@ -22,8 +22,7 @@ fn mean_of_panorama(map: &Panorama) -> f64 {
     analyse(map, &REQUEST).mean()[1]
 }
 
-/// A sun that fills one patch near a pole is narrower than the distance of four lines of the sky box' rule.
-const FLUX_ERROR: f64 = 4e-3;
+const FLUX_ERROR: f64 = 1e-6;
 
 #[test]
 fn skybox_keeps_flux_down_to_one_texel() {
