@@ -8,7 +8,7 @@ use kiln_image::Panorama;
 use kiln_sphere::{panorama_direction, real_harmonics};
 use std::f64::consts::PI;
 
-const REQUEST: AnalysisRequest = AnalysisRequest { alpha_min: 1.0, error: 1e-2 };
+const REQUEST: AnalysisRequest = AnalysisRequest { alpha_min: 1.0, sheen_alpha_min: None, error: 1e-2 };
 
 fn radiance(map: &Panorama, order: usize) -> ShCoefficients {
     sh(&analyse(map, &REQUEST), order)
