@@ -22,8 +22,8 @@ pub fn decode(file_bytes: usize) -> usize {
 
 /// [`crate::analyse`], for as many degrees as it may choose.
 pub fn analyse(width: usize, height: usize) -> usize {
-    // Stored, decoded, and the copy that loses its bright texels.
-    let panoramas = 3 * panorama(width, height);
+    // Stored and decoded.
+    let panoramas = 2 * panorama(width, height);
     with_slack(panoramas + analyse_bytes(width, height, BAND_LIMIT_MAX) + ANALYSIS_BYTES_MAX)
 }
 
