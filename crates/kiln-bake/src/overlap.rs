@@ -77,8 +77,10 @@ impl Overlaps {
             [tan * tan, 2.0 * sin_half * sin_half]
         };
         let edges: Vec<f64> = (0..=face_size).map(|i| 2.0 * i as f64 / face_size as f64 - 1.0).collect();
-        let squares = (1..height.div_ceil(2)).map(|row| ring(row)[0]).filter(|square| (1.0..2.0).contains(square));
-        let mut exits: Vec<f64> = squares.flat_map(|square| [-(square - 1.0).sqrt(), (square - 1.0).sqrt()]).collect();
+        let squares =
+            (1..height.div_ceil(2)).map(|row| ring(row)[0]).filter(|square| (1.0..2.0).contains(square));
+        let mut exits: Vec<f64> =
+            squares.flat_map(|square| [-(square - 1.0).sqrt(), (square - 1.0).sqrt()]).collect();
         exits.sort_unstable_by(f64::total_cmp);
         let is_wide = face_size.max(width / 4) < PIECES_MIN;
         let columns = width.div_ceil(4);
@@ -121,7 +123,8 @@ impl Overlaps {
         for face in SIDES {
             let from_centre = (column as f64 + 0.5) / width - panorama_uv(cube_direction(face, 0.0, 0.0))[0];
             let from_centre = from_centre - libm::rint(from_centre);
-            let s_at = |u: f64| if u.abs() < 0.125 { libm::tan(2.0 * PI * u) } else { libm::copysign(1.0, u) };
+            let s_at =
+                |u: f64| if u.abs() < 0.125 { libm::tan(2.0 * PI * u) } else { libm::copysign(1.0, u) };
             let s = [-0.5, 0.5].map(|half| s_at(half / width - from_centre));
             let texel = |s: [f64; 2]| {
                 self.edges.partition_point(|&edge| edge <= 0.5 * (s[0] + s[1])).clamp(1, self.face_size) - 1
@@ -134,7 +137,11 @@ impl Overlaps {
     }
 
     /// From one s to another, cut at rising places between, and where a parallel leaves the face.
-    fn cut(&self, [start, end]: [f64; 2], inner: impl Iterator<Item = f64>) -> impl Iterator<Item = [f64; 2]> {
+    fn cut(
+        &self,
+        [start, end]: [f64; 2],
+        inner: impl Iterator<Item = f64>,
+    ) -> impl Iterator<Item = [f64; 2]> {
         let mut cuts = vec![start];
         cuts.extend(inner.filter(|s| start < *s && *s < end));
         if start < end {
@@ -232,7 +239,10 @@ impl Overlaps {
         let along_p = |q: f64| Edge::new(q, p0.max(q * tan0), p1.min(q * tan1));
         let (beyond, before) = ([along_q(p1), along_p(q1)], [along_q(p0), along_p(q0)]);
         let squares = |edges: &[Edge; 2], pick: fn(f64, f64) -> f64, start: f64| {
-            edges.iter().filter(|edge| edge.is_some()).fold(start, |far, edge| pick(far, edge.far_squared(pick)))
+            edges
+                .iter()
+                .filter(|edge| edge.is_some())
+                .fold(start, |far, edge| pick(far, edge.far_squared(pick)))
         };
         let farthest = squares(&beyond, f64::max, 0.0);
         let nearest = if x == 0 && y == 0 { 0.0 } else { squares(&before, f64::min, f64::INFINITY) };

@@ -142,9 +142,7 @@ fn skybox_levels() {
 fn panorama_of_cube() {
     let cube = skybox(&random(64, 32, 4), 128).remove(0);
     // Columns and pieces of the side faces, columns and rows of a cap's quadrant, rows.
-    check(512 + 128 * 64 + 256, |cancel| {
-        Some(bytes(crate::panorama_of_cube(&cube, cancel).ok()?.rgb()))
-    });
+    check(512 + 128 * 64 + 256, |cancel| Some(bytes(crate::panorama_of_cube(&cube, cancel).ok()?.rgb())));
 }
 
 #[test]

@@ -103,7 +103,12 @@ fn shares_of_every_texel_of_either_map_add_up_to_it() {
     {
         let mut overlaps = all_overlaps(height, face_size);
         assert!(overlaps.iter().all(|(.., solid_angle)| *solid_angle >= 0.0));
-        check_within(&format!("{height}, {face_size}"), partition_error(&overlaps, height, face_size), 0.0, 1e-7);
+        check_within(
+            &format!("{height}, {face_size}"),
+            partition_error(&overlaps, height, face_size),
+            0.0,
+            1e-7,
+        );
         overlaps.pop();
         overlaps.pop();
         assert!(partition_error(&overlaps, height, face_size) > 1e-6, "the check itself");
