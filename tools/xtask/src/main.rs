@@ -23,6 +23,7 @@ cargo xtask test [--no-install]   install what tests need where that is allowed,
 cargo xtask bench [EDITS]         save-to-frame of shader and HDR edits, no-op bake, bake of one panorama
 cargo xtask bench cache           no-op bakes, planning, overhead and hashing on generated projects of up to 10 000 files
 cargo xtask faults [COUNT]        kill COUNT processes at random moments and flip COUNT bits (default 1000)
+cargo xtask fuzz [COUNT] [SEED]   decode COUNT damaged copies of each image file of the tests (default 100000)
 cargo xtask corpus [OUT]          bake and render the files of $KILN_CORPUS into OUT (default target/corpus)
 cargo xtask size                  build with and without the preview and compare time and size
 ";
@@ -37,6 +38,9 @@ fn main() -> ExitCode {
         ["bench", "cache"] => bench_cache::run(),
         ["faults"] => test::faults("1000"),
         ["faults", count] => test::faults(count),
+        ["fuzz"] => test::fuzz(None, None),
+        ["fuzz", count] => test::fuzz(Some(count), None),
+        ["fuzz", count, seed] => test::fuzz(Some(count), Some(seed)),
         ["bench", edits] => match edits.parse() {
             Ok(edits) => bench::run(edits),
             Err(_) => Err(format!("`{edits}` is no number of edits")),
