@@ -1,9 +1,11 @@
 //! Panorama → what all its lighting maps are made from.
 
-use crate::bright::{BrightTexel, take_brightest};
+use crate::bright::{BrightTexel, take_brightest, without};
 use crate::patch::Patch;
 use kiln_image::Panorama;
-use kiln_sphere::{Bulk, Cancel, Cancelled, Harmonics, Lobe};
+use kiln_sphere::{Cancel, Cancelled, Harmonics, Lobe};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 /// Highest band limit [`analyse`] chooses: GGX of α = 1/256 to 1e-4. Beyond it memory, not time, is the limit
@@ -56,20 +58,20 @@ pub fn analyse(
     cancel: Cancel,
 ) -> Result<Analysis, Cancelled> {
     let (width, height) = (panorama.width(), panorama.height());
-    let mut rgb = Bulk::new(Vec::with_capacity(panorama.rgb().len()));
-    for row in panorama.rgb().chunks_exact(width * 3) {
-        cancel.check()?;
-        rgb.extend_from_slice(row);
-    }
-    let whole = sums(width, height, &rgb, cancel)?;
+    let rgb = panorama.rgb();
+    let whole_row = |row: usize| Cow::Borrowed(&rgb[row * width * 3..][..width * 3]);
+    let whole = sums(width, height, whole_row, cancel)?;
     let need = Need::new(request, whole.mean(), whole.variance(), cancel)?;
-    let bright = take_brightest(width, height, &mut rgb, &whole, &need, cancel)?;
-    let rest = if bright.is_empty() { whole.clone() } else { sums(width, height, &rgb, cancel)? };
+    let bright = take_brightest(width, height, rgb, &whole, &need, cancel)?;
+    let by_row = BrightRows::new(width, &bright);
+    let dim_row = |row: usize| by_row.dim(row, whole_row(row));
+    let rest = if bright.is_empty() { whole.clone() } else { sums(width, height, dim_row, cancel)? };
     let band_limit = need.band_limit(rest.variance());
-    let dim = kiln_sphere::analyse(width, height, &rgb, band_limit, cancel)?;
+    let dim = kiln_sphere::analyse_rows(width, height, dim_row, band_limit, cancel)?;
     let mut low = dim.truncated(LOW_BAND_LIMIT);
     if !bright.is_empty() {
-        low.add(&analyse_bright(width, height, &bright, rgb, cancel)?);
+        let excess_row = |row: usize| by_row.excess(row);
+        low.add(&kiln_sphere::analyse_rows(width, height, excess_row, LOW_BAND_LIMIT, cancel)?);
     }
     Ok(Analysis {
         width,
@@ -83,24 +85,40 @@ pub fn analyse(
     })
 }
 
-/// Low harmonics of the bright texels' excess alone; `room` is as large as the panorama.
-fn analyse_bright(
+/// Bright texels by their rows: rows without and rows of nothing but their excess are made as they are read, since a
+/// copy of a large panorama would be most of the memory an analysis takes.
+struct BrightRows<'a> {
     width: usize,
-    height: usize,
-    bright: &[BrightTexel],
-    mut room: Bulk<Vec<f32>>,
-    cancel: Cancel,
-) -> Result<Harmonics, Cancelled> {
-    for row in room.chunks_exact_mut(width * 3) {
-        cancel.check()?;
-        row.fill(0.0);
-    }
-    for texel in bright {
-        for (value, excess) in room[3 * texel.index..].iter_mut().zip(texel.excess) {
-            *value = excess as f32;
+    rows: BTreeMap<usize, Vec<&'a BrightTexel>>,
+    black: Vec<f32>,
+}
+
+impl<'a> BrightRows<'a> {
+    fn new(width: usize, bright: &'a [BrightTexel]) -> Self {
+        let mut rows = BTreeMap::<_, Vec<_>>::new();
+        for texel in bright {
+            rows.entry(texel.index / width).or_default().push(texel);
         }
+        Self { width, rows, black: vec![0.0; width * 3] }
     }
-    kiln_sphere::analyse(width, height, &room, LOW_BAND_LIMIT, cancel)
+
+    /// A row without its bright texels' excess.
+    fn dim<'b>(&self, row: usize, mut whole: Cow<'b, [f32]>) -> Cow<'b, [f32]> {
+        for texel in self.rows.get(&row).into_iter().flatten() {
+            without(&mut whole.to_mut()[texel.index % self.width * 3..][..3], texel.excess);
+        }
+        whole
+    }
+
+    /// The excess alone.
+    fn excess(&self, row: usize) -> Cow<'_, [f32]> {
+        let mut values = Cow::Borrowed(self.black.as_slice());
+        for texel in self.rows.get(&row).into_iter().flatten() {
+            let place = texel.index % self.width * 3;
+            values.to_mut()[place..place + 3].copy_from_slice(&texel.excess.map(|value| value as f32));
+        }
+        values
+    }
 }
 
 impl Analysis {
@@ -147,12 +165,18 @@ impl Sums {
     }
 }
 
-fn sums(width: usize, height: usize, rgb: &[f32], cancel: Cancel) -> Result<Sums, Cancelled> {
+fn sums<'a>(
+    width: usize,
+    height: usize,
+    row: impl Fn(usize) -> Cow<'a, [f32]>,
+    cancel: Cancel,
+) -> Result<Sums, Cancelled> {
     let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
     let (mut flux, mut energy) = ([0.0; 3], 0.0);
-    for (row, texels) in rgb.chunks_exact(width * 3).enumerate() {
+    for index in 0..height {
         cancel.check()?;
-        let solid_angle_sr = Patch::of_texel(width, height, row * width).solid_angle_sr();
+        let texels = row(index);
+        let solid_angle_sr = Patch::of_texel(width, height, index * width).solid_angle_sr();
         let (mut sum, mut squares) = ([0.0; 3], [0.0; 3]);
         for texel in texels.chunks_exact(3) {
             for channel in 0..3 {

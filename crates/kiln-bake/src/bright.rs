@@ -18,14 +18,14 @@ const BRIGHTNESS_MIN: f64 = 16.0;
 /// What convolving one texel for all texels of a chain costs, in units of L²: measured, 0.4 ms beside 0.8 µs · L².
 const TEXEL_COST: f64 = 500.0;
 
-/// Takes the brightest texels (by their largest channel) down to the brightest that stays, keeping their hue; `rgb` is
-/// left with the rest, of which and of their excess the texel is the exact sum.
+/// The excess of the brightest texels (by their largest channel) over the brightest that stays; what is left of each has
+/// its hue ([`without`]).
 ///
 /// As many, up to [`BRIGHT_MAX`], as save more degrees than they cost: a sun goes, a lit window stays.
 pub(crate) fn take_brightest(
     width: usize,
     height: usize,
-    rgb: &mut [f32],
+    rgb: &[f32],
     whole: &Sums,
     need: &Need,
     cancel: Cancel,
@@ -53,19 +53,23 @@ pub(crate) fn take_brightest(
     let taken = counts.min_by(|a, b| cost(a).total_cmp(&cost(b)).then(a.cmp(b))).unwrap_or(0);
     let stays = stays(taken);
     let take = |&(value, index): &(f32, usize)| {
-        let texel = &mut rgb[3 * index..3 * index + 3];
         let excess = std::array::from_fn(|channel| {
-            let whole = texel[channel];
-            // Both differences are exact: either part is at most twice the other (Sterbenz).
-            let excess = whole - whole * (stays / value);
-            texel[channel] = whole - excess;
-            f64::from(excess)
+            let whole = rgb[3 * index + channel];
+            f64::from(whole - whole * (stays / value))
         });
         BrightTexel { index, excess }
     };
     let mut bright: Vec<BrightTexel> = top[..taken].iter().map(take).collect();
     bright.retain(|texel| texel.excess.iter().any(|&value| value > 0.0));
     Ok(bright)
+}
+
+/// What is left of a texel; it and the excess add up to the texel exactly.
+pub(crate) fn without(texel: &mut [f32], excess: [f64; 3]) {
+    for (value, excess) in texel.iter_mut().zip(excess) {
+        // The excess came from `f32`, and both differences are exact: either part is at most twice the other (Sterbenz).
+        *value -= excess as f32;
+    }
 }
 
 /// The `count` brightest texels (value, index), brightest first, of equal ones the first.

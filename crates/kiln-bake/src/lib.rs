@@ -37,6 +37,7 @@ mod tables;
 #[cfg(test)]
 mod tests;
 
+pub use kiln_brdf::{Masking, SheenVisibility};
 pub use kiln_sphere::{Bulk, Cancel, Cancelled, Lobe};
 
 pub use analysis::{Analysis, AnalysisRequest, BAND_LIMIT_MAX, BRIGHT_MAX, analyse};

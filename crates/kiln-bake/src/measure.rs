@@ -107,9 +107,28 @@ impl BruteForce {
     /// # Errors
     /// [`Cancelled`] within the work of a few rows.
     pub fn radiance(&self, lobe: Lobe, axis: [f64; 3], cancel: Cancel) -> Result<[f64; 3], Cancelled> {
+        Ok(self.radiances(lobe, &[axis], cancel)?[0])
+    }
+
+    /// [`BruteForce::radiance`] in many directions, for which the panorama is read once.
+    ///
+    /// # Errors
+    /// [`Cancelled`] within the work of a few rows.
+    pub fn radiances(
+        &self,
+        lobe: Lobe,
+        axes: &[[f64; 3]],
+        cancel: Cancel,
+    ) -> Result<Vec<[f64; 3]>, Cancelled> {
         let lobe = usable(lobe);
         let profile = lobe.profile(lobe.kernel(0, cancel)?.ln_norm);
-        Ok(self.sum(&profile, &[axis], cancel)?[0])
+        self.sum(&profile, axes, cancel)
+    }
+
+    /// Texels of a cube of `face_size` nearest to where errors of a lobe's map hide: the brightest light, a ring around
+    /// it, its horizon and its opposite, the poles, the wrap column, a cube's edge and corner. Ascending, none twice.
+    pub fn probe_texels(&self, lobe: Lobe, face_size: usize) -> Vec<usize> {
+        probe_texels(self.brightest, lobe, face_size)
     }
 
     fn sum(&self, profile: &Profile, axes: &[[f64; 3]], cancel: Cancel) -> Result<Vec<[f64; 3]>, Cancelled> {

@@ -62,8 +62,8 @@ pub fn skybox_of_cube(source_size: usize, face_size: usize) -> usize {
 
 /// [`crate::analyse`], for as many degrees as it may choose.
 pub fn analyse(width: usize, height: usize) -> usize {
-    // Stored, decoded, and the copy that loses its bright texels.
-    let panoramas = 3 * panorama(width, height);
+    // Stored and decoded.
+    let panoramas = 2 * panorama(width, height);
     with_slack(panoramas + analyse_bytes(width, height, BAND_LIMIT_MAX) + ANALYSIS_BYTES_MAX)
 }
 

@@ -7,7 +7,8 @@ use std::time::Instant;
 use kiln_build::{ActionId, Engine, Error, RunOptions, RunReport, TargetState, Targets};
 use kiln_diagnostic::{Diagnostic, Severity};
 
-use crate::plan::{PartSpec, Plan, TargetSpec, plan};
+use crate::Project;
+use crate::plan::{PartSpec, Plan, TargetSpec, plan, plan_project};
 
 /// A finished build.
 pub struct Built {
@@ -38,11 +39,47 @@ pub fn build(
     options: &RunOptions,
 ) -> Result<Option<Built>, Error> {
     let mut changed = changed;
+    heal(options, |is_first| {
+        if !is_first {
+            changed = None;
+        }
+        let start = Instant::now();
+        let plan = plan(engine, changed)?;
+        let plan_ms = start.elapsed().as_secs_f64() * 1e3;
+        let Some((report, run_ms)) = run_plan(engine, &plan, options)? else { return Ok(None) };
+        let (targets, diagnostics) = plan.resolve(engine, &report);
+        let targets = Arc::new(targets);
+        engine.publish(&targets)?;
+        Ok(Some(Built { plan, report, targets, diagnostics, plan_ms, run_ms }))
+    })
+}
+
+/// Builds what `project` asks for with the sources of the engine's folder, and publishes nothing: for exports and
+/// one-shot bakes. What could not be made is missing among the targets.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_apart(engine: &Engine, project: &Project, options: &RunOptions) -> Result<Option<Built>, Error> {
+    heal(options, |_| {
+        let start = Instant::now();
+        engine.begin_plan(None);
+        let plan = plan_project(engine, project.clone(), Vec::new())?;
+        let plan_ms = start.elapsed().as_secs_f64() * 1e3;
+        let Some((report, run_ms)) = run_plan(engine, &plan, options)? else { return Ok(None) };
+        let (targets, diagnostics) = plan.resolve_fresh(&report);
+        Ok(Some(Built { plan, report, targets: Arc::new(targets), diagnostics, plan_ms, run_ms }))
+    })
+}
+
+/// Tries again after damage, which is found, and dropped, one blob at a time, and after a source that changed while it was
+/// read.
+fn heal(
+    options: &RunOptions,
+    mut build: impl FnMut(bool) -> Result<Option<Built>, Error>,
+) -> Result<Option<Built>, Error> {
     let mut tries = 0;
     loop {
-        let result = build_once(engine, changed, options);
-        // Damage is found, and dropped, one blob at a time; a source that changed while it was read is seen as it is at
-        // the second look.
+        let result = build(tries == 0);
         let is_healing = matches!(result, Err(Error::Lost { .. } | Error::SourceChanged { .. }));
         if is_healing && options.cancel.load(Ordering::SeqCst) {
             return Ok(None);
@@ -50,7 +87,6 @@ pub fn build(
         if !is_healing || tries == HEALING_TRIES_MAX {
             return result;
         }
-        changed = None;
         tries += 1;
     }
 }
@@ -58,24 +94,13 @@ pub fn build(
 /// More damaged blobs than this in one build are a broken disk.
 pub const HEALING_TRIES_MAX: usize = 64;
 
-fn build_once(
-    engine: &Engine,
-    changed: Option<&[String]>,
-    options: &RunOptions,
-) -> Result<Option<Built>, Error> {
-    let start = Instant::now();
-    let plan = plan(engine, changed)?;
-    let plan_ms = start.elapsed().as_secs_f64() * 1e3;
+/// What happened, and for how many milliseconds; `None` if it was cancelled.
+fn run_plan(engine: &Engine, plan: &Plan, options: &RunOptions) -> Result<Option<(RunReport, f64)>, Error> {
     let start = Instant::now();
     let report = engine.run(&plan.graph, options)?;
     let run_ms = start.elapsed().as_secs_f64() * 1e3;
-    if !report.is_complete() && options.cancel.load(Ordering::SeqCst) {
-        return Ok(None);
-    }
-    let (targets, diagnostics) = plan.resolve(engine, &report);
-    let targets = Arc::new(targets);
-    engine.publish(&targets)?;
-    Ok(Some(Built { plan, report, targets, diagnostics, plan_ms, run_ms }))
+    let is_cancelled = !report.is_complete() && options.cancel.load(Ordering::SeqCst);
+    Ok((!is_cancelled).then_some((report, run_ms)))
 }
 
 impl Built {

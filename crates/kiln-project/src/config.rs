@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use kiln_bake::TexelFormat;
 use kiln_diagnostic::Diagnostic;
-use kiln_image::TexelPolicy;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use crate::env_config::{EnvConfig, read_env};
+use crate::lut_config::{LutConfig, read_lut};
 use crate::reader::{Document, Section, suggest};
 
 /// Version of the project file that this Kiln reads.
@@ -20,42 +20,18 @@ pub struct Project {
     pub name: String,
     /// `[env.NAME]`.
     pub envs: BTreeMap<String, EnvConfig>,
+    /// `[lut.NAME]`.
+    pub luts: BTreeMap<String, LutConfig>,
     /// `[scene.NAME]`.
     pub scenes: BTreeMap<String, SceneConfig>,
     /// `[shader.NAME]`.
     pub shaders: BTreeMap<String, ShaderConfig>,
     /// Folder for baked files, relative to the project.
     pub output_dir: String,
+    /// Whether the GGX table that the preview's shaders read is left out; no key of kiln.toml.
+    pub is_without_default_lut: bool,
     /// What the baked files may take together: the budget of `[check]`.
     pub bytes_max: Option<u64>,
-}
-
-/// An environment and the quality it is baked with.
-#[derive(Clone, Debug, PartialEq)]
-pub struct EnvConfig {
-    /// Panorama: .hdr, .exr, .png or .jpg.
-    pub source: String,
-    /// Edge of the specular chain's first level, in texels; a power of two.
-    pub size: usize,
-    /// Edge of the irradiance cube.
-    pub irradiance_size: usize,
-    /// Error asked for, relative RMS, encoding included.
-    pub error: f64,
-    /// Texel format.
-    pub format: TexelFormat,
-    /// What happens to values that a half float cannot hold.
-    pub range: Range,
-    /// What happens to NaN, infinite and negative texels.
-    pub texels: TexelPolicy,
-}
-
-/// What happens to values above 65504 when texels are half floats.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Range {
-    /// All texels are divided by a power of two, which is recorded.
-    Scale,
-    /// Such a map is stored as 32-bit floats.
-    F32,
 }
 
 /// A scene, and what it is looked at with.
@@ -111,16 +87,18 @@ pub fn parse_project(text: &str) -> (Project, Vec<Diagnostic>) {
     let mut project = Project {
         name: "kiln".to_owned(),
         envs: BTreeMap::new(),
+        luts: BTreeMap::new(),
         scenes: BTreeMap::new(),
         shaders: BTreeMap::new(),
         output_dir: "baked".to_owned(),
+        is_without_default_lut: false,
         bytes_max: None,
     };
     read_root(&mut document, root.get_ref(), &mut project);
     (project, document.diagnostics)
 }
 
-const TABLES: [&str; 7] = ["version", "project", "env", "scene", "shader", "output", "check"];
+const TABLES: [&str; 8] = ["version", "project", "env", "lut", "scene", "shader", "output", "check"];
 
 fn read_root<'a>(document: &mut Document<'a>, root: &DeTable<'a>, project: &mut Project) {
     check_version(document, root);
@@ -148,6 +126,8 @@ fn read_root<'a>(document: &mut Document<'a>, root: &DeTable<'a>, project: &mut 
                 project.bytes_max = section.bytes("max_bytes");
             }),
             "env" => read_named(document, "env", value, |section, _| read_env(section), &mut project.envs),
+            // [lut.ggx] stands for the default table.
+            "lut" => read_named(document, "lut", value, read_lut, &mut project.luts),
             "scene" => {
                 let read = |section: &mut Section, _: &str| read_scene(section, &envs, &shaders);
                 read_named(document, "scene", value, read, &mut project.scenes);
@@ -245,41 +225,13 @@ fn read_output_dir(section: &mut Section) -> Option<String> {
     Some(dir)
 }
 
-fn read_env(section: &mut Section) -> EnvConfig {
-    let config = EnvConfig {
-        source: read_source(section, "environments/sky.hdr"),
-        size: section.integer("size", 1..=4096).unwrap_or(256),
-        irradiance_size: section.integer("irradiance_size", 1..=1024).unwrap_or(64),
-        error: section.number("error", 1e-7..=1.0).unwrap_or(1e-3),
-        format: section
-            .choice("format", &[("rgba16f", TexelFormat::Rgba16Float), ("rgba32f", TexelFormat::Rgba32Float)])
-            .unwrap_or(TexelFormat::Rgba16Float),
-        range: section
-            .choice("range", &[("scale", Range::Scale), ("f32", Range::F32)])
-            .unwrap_or(Range::Scale),
-        texels: section
-            .choice(
-                "texels",
-                &[
-                    ("repair", TexelPolicy::Repair),
-                    ("error", TexelPolicy::Error),
-                    ("keep", TexelPolicy::Keep),
-                ],
-            )
-            .unwrap_or(TexelPolicy::Repair),
-    };
-    if !config.size.is_power_of_two() {
-        let message = format!("`size` is {}, which is no power of two", config.size);
-        let help =
-            format!("use {} or {}", config.size.next_power_of_two() / 2, config.size.next_power_of_two());
-        section.fail(message, section.place("size"), Some(help));
-    }
-    config
-}
-
 /// A source's path, in the one spelling by which the rest knows it.
 fn read_source(section: &mut Section, example: &'static str) -> String {
-    let path = section.required_text("source", example).replace('\\', "/");
+    normalised(&section.required_text("source", example))
+}
+
+pub(crate) fn normalised(path: &str) -> String {
+    let path = path.replace('\\', "/");
     let parts: Vec<&str> = path
         .split('/')
         .enumerate()

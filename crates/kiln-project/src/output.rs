@@ -11,6 +11,8 @@ use kiln_image::ktx2;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::env_config::FORMATS;
+
 /// Version of the manifest's form.
 const MANIFEST_SCHEMA: u32 = 1;
 /// Version of the code that makes files of targets: raise it whenever the same target may give other bytes.
@@ -230,11 +232,10 @@ fn part_path(name: &str, part: &str) -> String {
 fn texture_file(name: &str, target: &Target, contents: &[(&str, Arc<[u8]>)]) -> Vec<u8> {
     let fact = |key: &str| target.meta.get(key).and_then(Value::as_u64).unwrap_or(1);
     let size = usize::try_from(fact("size")).unwrap_or(usize::MAX);
-    let format = match target.meta.get("format").and_then(Value::as_str) {
-        Some("rgba32f") => ktx2::Format::R32G32B32A32_SFLOAT,
-        Some("rg32f") => ktx2::Format::R32G32_SFLOAT,
-        _ => ktx2::Format::R16G16B16A16_SFLOAT,
-    };
+    let width = target.meta.get("width").map_or(size, |_| usize::try_from(fact("width")).unwrap_or(size));
+    let format = target.meta.get("format").and_then(Value::as_str).unwrap_or_default();
+    let known = FORMATS.iter().find(|(name, _)| *name == format);
+    let format = known.map_or(ktx2::Format::R32G32_SFLOAT, |(_, format)| format.ktx2());
     let mut key_values = vec![("KilnTarget".to_owned(), name.to_owned())];
     for (key, fact) in [("KilnScaleLog2", "scale_log2"), ("KilnLaw", "law")] {
         if let Some(value) = target.meta.get(fact) {
@@ -244,5 +245,5 @@ fn texture_file(name: &str, target: &Target, contents: &[(&str, Arc<[u8]>)]) -> 
     }
     let faces = if target.kind == "cube" { 6 } else { 1 };
     let levels = contents.iter().map(|(_, bytes)| &**bytes).collect();
-    ktx2::write(&ktx2::Texture { format, width: size, height: size, faces, levels, key_values })
+    ktx2::write(&ktx2::Texture { format, width, height: size, faces, levels, key_values })
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use kiln_bake::RoughnessLaw;
 use kiln_build::{
     ActionId, ActionRecord, Engine, Error, Graph, OutputRecord, Part, RunReport, SourceState, Target,
     TargetState, Targets,
@@ -9,7 +10,7 @@ use kiln_build::{
 use kiln_diagnostic::{Diagnostic, has_errors};
 use serde_json::{Map, Value, json};
 
-use crate::{PROJECT_FILE, Project, environment, parse_project, scene, shader};
+use crate::{PROJECT_FILE, Project, environment, lut, parse_project, scene, shader};
 
 /// What must be done for a project, before any of it is done.
 pub struct Plan {
@@ -51,6 +52,13 @@ pub enum PartSpec {
     },
     /// The outputs `levels/mip0`, `levels/mip1` … of an action, however many there are.
     Levels(ActionId),
+    /// No content: what an action found out about the target, `facts.OF` of what it said, as the target's `measured`.
+    Facts {
+        /// Which action.
+        action: ActionId,
+        /// Which of its facts.
+        of: String,
+    },
 }
 
 impl PartSpec {
@@ -62,7 +70,9 @@ impl PartSpec {
     /// The action it comes from.
     pub fn action(&self) -> ActionId {
         match self {
-            PartSpec::One { action, .. } | PartSpec::Levels(action) => *action,
+            PartSpec::One { action, .. } | PartSpec::Levels(action) | PartSpec::Facts { action, .. } => {
+                *action
+            }
         }
     }
 
@@ -76,6 +86,7 @@ impl PartSpec {
         };
         match self {
             PartSpec::One { output, part, .. } => Some(vec![named(part, outcome.output(output)?)]),
+            PartSpec::Facts { .. } => outcome.succeeded().then(Vec::new),
             PartSpec::Levels(_) => {
                 let outputs = outcome.record.as_ref()?.result.outputs.iter();
                 let levels =
@@ -135,8 +146,22 @@ pub(crate) fn no_content(what: &str, unreadable: Option<&str>) -> Diagnostic {
 /// The store cannot be used. Errors of the project are in [`Plan::diagnostics`].
 pub fn plan(engine: &Engine, changed: Option<&[String]>) -> Result<Plan, Error> {
     engine.begin_plan(changed);
-    let mut planner = Planner::default();
-    let project = read_project(engine, &mut planner.diagnostics);
+    let mut diagnostics = Vec::new();
+    let project = read_project(engine, &mut diagnostics);
+    if project.envs.values().any(|env| env.law != RoughnessLaw::Linear) {
+        let message = "the preview reads specular levels as linear in roughness; `law` is for engines";
+        diagnostics.push(Diagnostic::note(message).in_file(PROJECT_FILE));
+    }
+    plan_project(engine, project, diagnostics)
+}
+
+/// Plans what a project asks for, wherever that was written.
+pub(crate) fn plan_project(
+    engine: &Engine,
+    project: Project,
+    diagnostics: Vec<Diagnostic>,
+) -> Result<Plan, Error> {
+    let mut planner = Planner { diagnostics, ..Planner::default() };
     let mut variants = shader::Variants::default();
     for (name, config) in &project.scenes {
         scene::plan_scene(&mut planner, engine, name, config, &mut variants)?;
@@ -147,8 +172,12 @@ pub fn plan(engine: &Engine, changed: Option<&[String]>) -> Result<Plan, Error> 
     for (name, config) in &project.envs {
         environment::plan_environment(&mut planner, engine, name, config);
     }
-    if !project.envs.is_empty() {
-        shader::plan_brdf_table(&mut planner);
+    // What the preview's shaders read.
+    if !project.envs.is_empty() && !project.is_without_default_lut && !project.luts.contains_key("ggx") {
+        lut::plan_lut(&mut planner, "ggx", &lut::DEFAULT);
+    }
+    for (name, config) in &project.luts {
+        lut::plan_lut(&mut planner, name, config);
     }
     let meta = json!({
         "name": project.name,
@@ -160,7 +189,7 @@ pub fn plan(engine: &Engine, changed: Option<&[String]>) -> Result<Plan, Error> 
     Ok(Plan { project, graph, targets, diagnostics, subjects })
 }
 
-fn read_project(engine: &Engine, diagnostics: &mut Vec<Diagnostic>) -> Project {
+pub(crate) fn read_project(engine: &Engine, diagnostics: &mut Vec<Diagnostic>) -> Project {
     let text = match engine.sources().read(PROJECT_FILE) {
         None => {
             let missing = Diagnostic::error("there is no kiln.toml in this folder")
@@ -197,9 +226,14 @@ impl Plan {
         diagnostic
     }
 
-    /// Joins what the actions made into targets. One whose actions failed keeps the content that was published last,
-    /// marked stale; one that nothing asks for any more goes, unless an error may be what hides the wish for it.
-    pub fn resolve(&self, engine: &Engine, report: &RunReport) -> (Targets, Vec<Diagnostic>) {
+    /// Joins what the actions made into targets; without those that could not be made.
+    pub(crate) fn resolve_fresh(&self, report: &RunReport) -> (Targets, Vec<Diagnostic>) {
+        let made = |spec: &TargetSpec| Some((spec.name.clone(), resolve_target(spec, report)?));
+        (self.targets.iter().filter_map(made).collect(), self.said(report))
+    }
+
+    /// Everything that planning and running said.
+    fn said(&self, report: &RunReport) -> Vec<Diagnostic> {
         let mut diagnostics = self.diagnostics.clone();
         for (action, diagnostic) in report.diagnostics() {
             let diagnostic = self.with_subject(action, diagnostic);
@@ -207,6 +241,13 @@ impl Plan {
                 diagnostics.push(diagnostic);
             }
         }
+        diagnostics
+    }
+
+    /// Joins what the actions made into targets. One whose actions failed keeps the content that was published last,
+    /// marked stale; one that nothing asks for any more goes, unless an error may be what hides the wish for it.
+    pub fn resolve(&self, engine: &Engine, report: &RunReport) -> (Targets, Vec<Diagnostic>) {
+        let mut diagnostics = self.said(report);
         let mut targets = Targets::new();
         if has_errors(&diagnostics) {
             let published = engine.published();
@@ -242,8 +283,17 @@ fn resolve_target(spec: &TargetSpec, report: &RunReport) -> Option<Target> {
 /// the facts of the plan, which win: an action may serve two targets.
 fn gather_meta(spec: &TargetSpec, report: &RunReport) -> Value {
     let mut meta = Map::new();
-    let mut actions: Vec<ActionId> = spec.parts.iter().map(PartSpec::action).collect();
+    let is_content = |part: &&PartSpec| !matches!(part, PartSpec::Facts { .. });
+    let mut actions: Vec<ActionId> = spec.parts.iter().filter(is_content).map(PartSpec::action).collect();
     actions.dedup();
+    for part in &spec.parts {
+        if let PartSpec::Facts { action, of } = part
+            && let Some(record) = &report.outcome(*action).record
+            && let Some(facts) = record.result.meta.get("facts").and_then(|facts| facts.get(of))
+        {
+            meta.insert("measured".to_owned(), facts.clone());
+        }
+    }
     let records: Vec<&ActionRecord> =
         actions.iter().filter_map(|action| report.outcome(*action).record.as_deref()).collect();
     let mut details = Vec::new();

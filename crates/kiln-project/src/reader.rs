@@ -77,6 +77,61 @@ impl<'a, 'd> Section<'a, 'd> {
         }
     }
 
+    /// A text, or an array of texts.
+    pub(crate) fn texts(&mut self, key: &'static str) -> Option<Vec<String>> {
+        let value = self.find(key)?;
+        let texts: Option<Vec<String>> = match value.get_ref() {
+            DeValue::String(text) => Some(vec![text.to_string()]),
+            DeValue::Array(values) => {
+                values.iter().map(|value| value.get_ref().as_str().map(str::to_owned)).collect()
+            }
+            _ => None,
+        };
+        if texts.is_none() {
+            self.wrong_type(key, "a string or an array of strings", value);
+        }
+        texts
+    }
+
+    /// Whether the value of `key` is an array.
+    pub(crate) fn is_array(&self, key: &str) -> bool {
+        let entry = self.table.iter().find(|(name, _)| name.get_ref() == key);
+        entry.is_some_and(|(_, value)| matches!(value.get_ref(), DeValue::Array(_)))
+    }
+
+    /// An array of numbers.
+    pub(crate) fn numbers(&mut self, key: &'static str) -> Option<Vec<f64>> {
+        let value = self.find(key)?;
+        let number = |value: &Spanned<DeValue>| match value.get_ref() {
+            DeValue::Float(float) => float.as_str().replace('_', "").parse().ok(),
+            DeValue::Integer(integer) => integer.as_str().replace('_', "").parse().ok(),
+            _ => None,
+        };
+        let numbers = match value.get_ref() {
+            DeValue::Array(values) => values.iter().map(number).collect(),
+            _ => None,
+        };
+        if numbers.is_none() {
+            self.wrong_type(key, "an array of numbers", value);
+        }
+        numbers
+    }
+
+    pub(crate) fn boolean(&mut self, key: &'static str) -> Option<bool> {
+        let value = self.find(key)?;
+        match value.get_ref() {
+            DeValue::Boolean(boolean) => Some(*boolean),
+            _ => {
+                self.wrong_type(key, "true or false", value);
+                None
+            }
+        }
+    }
+
+    pub(crate) fn missing(&mut self, key: &'static str, example: &'static str) {
+        self.missing.push((key, example));
+    }
+
     pub(crate) fn required_text(&mut self, key: &'static str, example: &'static str) -> String {
         if !self.table.iter().any(|(name, _)| name.get_ref() == key) {
             self.missing.push((key, example));

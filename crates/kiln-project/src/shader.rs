@@ -6,12 +6,10 @@ use std::sync::Arc;
 use kiln_build::{Action, ActionOutput, Engine, Error, Input, little_memory};
 use serde_json::{Value, json};
 
-use crate::environment::{cancel, command, ended, failure, success};
+use crate::environment::{command, failure};
 use crate::plan::{PartSpec, Planner, no_content, rank, unreadable};
 use crate::{Role, ShaderConfig};
 
-/// Edge of the BRDF table, in texels.
-const BRDF_TABLE_SIZE: usize = 64;
 /// Version of the compiler behind both the scan and the action.
 const COMPILE_RECIPE: u32 = 1;
 
@@ -104,28 +102,4 @@ fn compile(
 /// Shader text that is no UTF-8 shows its wrong bytes as U+FFFD in the diagnostic that follows.
 fn text(bytes: &[u8]) -> Arc<str> {
     String::from_utf8_lossy(bytes).into()
-}
-
-/// Adds the GGX scale/bias table, which every environment shares.
-pub(crate) fn plan_brdf_table(planner: &mut Planner) {
-    let table = planner.graph.add(Action {
-        name: "integrate lut/ggx".to_owned(),
-        command: command(
-            "brdf table",
-            1,
-            json!({"size": BRDF_TABLE_SIZE, "masking": "height-correlated Smith"}),
-            &["texels"],
-        ),
-        inputs: Vec::new(),
-        rank: rank::SCENE,
-        memory: little_memory(),
-        perform: Arc::new(|inputs| {
-            let texels = kiln_bake::dfg_table(BRDF_TABLE_SIZE, cancel(inputs)).map_err(ended)?;
-            let bytes = texels.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
-            Ok(success("texels", bytes, Value::Null))
-        }),
-    });
-    let meta =
-        json!({"size": BRDF_TABLE_SIZE, "format": "rg32f", "axes": "x = n.v, y = perceptual roughness"});
-    planner.target("lut/ggx".to_owned(), "lut", meta, vec![PartSpec::one(table, "texels")]);
 }

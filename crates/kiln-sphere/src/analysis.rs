@@ -17,6 +17,7 @@ use crate::harmonics::{Coefficient, Harmonics, coefficient_count};
 use crate::legendre::{BATCH, LANES, Order, Padded, RingBlock, add_products, unpad};
 use crate::simd;
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::f64::consts::PI;
 
 /// Harmonics of a panorama of `width` × `height` constant patches, degrees up to `band_limit`.
@@ -35,7 +36,23 @@ pub fn analyse(
     cancel: Cancel,
 ) -> Result<Harmonics, Cancelled> {
     assert!(width > 0 && rgb.len() == width * height * 3, "{width}x{height} texels, {} values", rgb.len());
-    let spectra = row_spectra(width, height, rgb, band_limit, cancel)?;
+    analyse_rows(width, height, |row| Cow::Borrowed(&rgb[row * width * 3..][..width * 3]), band_limit, cancel)
+}
+
+/// [`analyse`] of rows that are made as they are read, so that a changed panorama needs no copy of its own.
+///
+/// `row` gives the `width · 3` values of a row. Panics if it gives another number.
+///
+/// # Errors
+/// [`Cancelled`] within a row's or a block of rings' work.
+pub fn analyse_rows<'a>(
+    width: usize,
+    height: usize,
+    row: impl Fn(usize) -> Cow<'a, [f32]> + Sync,
+    band_limit: usize,
+    cancel: Cancel,
+) -> Result<Harmonics, Cancelled> {
+    let spectra = row_spectra(width, height, row, band_limit, cancel)?;
     let rows: &[Coefficient] = &spectra;
     let columns = Columns::new(height, band_limit);
     let stride = rows.len() / height;
@@ -82,10 +99,10 @@ fn alias(m: usize, width: usize) -> (usize, bool) {
 }
 
 /// Σ_j f_j e^{−2πimj/W} for 0 ≤ m ≤ min(L, W/2), row by row.
-fn row_spectra(
+fn row_spectra<'a>(
     width: usize,
     height: usize,
-    rgb: &[f32],
+    row: impl Fn(usize) -> Cow<'a, [f32]> + Sync,
     band_limit: usize,
     cancel: Cancel,
 ) -> Result<Bulk<Vec<Coefficient>>, Cancelled> {
@@ -94,18 +111,20 @@ fn row_spectra(
     // Plain zeros come from the system as they are touched, in the loop; zeros of another type would be written here,
     // all 200 MB of them.
     let mut spectra = Bulk::new(vec![[0.0; 6]; height * stride]);
-    spectra.par_chunks_mut(stride * ROWS).zip(rgb.par_chunks(width * 3 * ROWS)).try_for_each_init(
+    spectra.par_chunks_mut(stride * ROWS).enumerate().try_for_each_init(
         || (vec![Batch::default(); width], Vec::new()),
-        |(signals, room), (out, texels)| {
+        |(signals, room), (block, out)| {
             cancel.check()?;
-            if texels.iter().all(|&value| value == 0.0) {
+            let first = block * ROWS;
+            let rows: Vec<_> = (first..first + out.len() / stride).map(&row).collect();
+            if rows.iter().all(|texels| texels.iter().all(|&value| value == 0.0)) {
                 // As the spectra are already: a few bright texels alone cost little.
                 return Ok(());
             }
             for channel in 0..3 {
                 cancel.check()?;
-                for (row, texels) in texels.chunks_exact(width * 3).enumerate() {
-                    let values = texels[channel..].iter().step_by(3);
+                for (row, texels) in rows.iter().enumerate() {
+                    let values = texels[channel..width * 3].iter().step_by(3);
                     for (signal, &value) in signals.iter_mut().zip(values) {
                         let parts = if row % 2 == 0 { &mut signal.re } else { &mut signal.im };
                         parts[row / 2] = f64::from(value);

@@ -34,7 +34,7 @@ mod testing;
 mod tests;
 mod world;
 
-pub use analysis::{analyse, analyse_bytes};
+pub use analysis::{analyse, analyse_bytes, analyse_rows};
 pub use cancel::{Bulk, Cancel, Cancelled};
 
 pub use direction::{

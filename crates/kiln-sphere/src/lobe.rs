@@ -84,16 +84,23 @@ impl GgxProfile {
     }
 }
 
+/// ln 1e-9.
+const NEGLIGIBLE_LN: f64 = -20.723_265_836_946_41;
+
 /// (2 + 1/α) sin(θ_h)^(1/α) / 2π in logarithms.
 #[derive(Clone, Copy, Debug)]
 pub struct CharlieProfile {
     alpha: f64,
     ln_scale: f64,
+    /// Squared chord up to which K is below 1e-9 of what it is at the horizon.
+    negligible_chord2: f64,
 }
 
 impl CharlieProfile {
     fn new(alpha: f64, ln_norm: f64) -> Self {
-        Self { alpha, ln_scale: libm::log((2.0 + 1.0 / alpha) / (2.0 * PI)) - ln_norm }
+        let ln_scale = libm::log((2.0 + 1.0 / alpha) / (2.0 * PI)) - ln_norm;
+        let negligible_chord2 = 2.0 * libm::exp(2.0 * alpha * NEGLIGIBLE_LN);
+        Self { alpha, ln_scale, negligible_chord2 }
     }
 }
 
@@ -119,10 +126,10 @@ impl ZonalKernel for CharlieProfile {
         if sin2 > 0.0 { libm::exp(self.ln_scale + 0.5 / self.alpha * libm::log(sin2)) } else { 0.0 }
     }
 
-    /// Twice the e-folding length of a power of the chord; near the axis, where it has no weight, no less than 0.02.
+    /// Twice the e-folding length of a power of the chord; anything where it has no weight.
     #[inline(always)]
     fn scale2(&self, chord2: f64) -> f64 {
-        4.0 * self.alpha * self.alpha * (chord2 + 4e-4)
+        if chord2 < self.negligible_chord2 { 4.0 } else { 4.0 * self.alpha * self.alpha * (chord2 + 4e-4) }
     }
 }
 

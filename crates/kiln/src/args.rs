@@ -27,6 +27,10 @@ pub(crate) enum Command {
     Init(InitArgs),
     /// Run every action that is out of date and no other; write KTX2 files and manifest.json
     Bake(BakeArgs),
+    /// Bake one environment or many without a project: files in, maps out
+    Env(EnvArgs),
+    /// Write a project's environments as an engine wants them
+    Export(ExportArgs),
     /// Say what a bake would run, and why, without running it
     Plan(ReadArgs),
     /// Explain a target: what changed when, with old and new values, and why the rest was left alone
@@ -83,6 +87,121 @@ pub(crate) struct BuildArgs {
     /// Print JSON instead of text
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// An engine preset by its name.
+fn parse_preset(text: &str) -> Result<kiln_project::Preset, String> {
+    text.parse().map_err(|error: kiln_export::UnknownPreset| error.to_string())
+}
+
+/// Actions at once and their memory, for commands without a project.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct RunArgs {
+    /// Actions at once [default: the number of cores]
+    #[arg(short, long)]
+    pub(crate) jobs: Option<usize>,
+    /// What the actions at work may take together, as 4GiB [default: three quarters of what is free]
+    #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
+    pub(crate) memory: Option<u64>,
+    /// Print JSON instead of text
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, ClapArgs)]
+#[command(after_help = "\
+Examples:
+  kiln env studio.hdr --out maps                 KTX2 cubes, harmonics and manifest.json in maps/studio
+  kiln env *.hdr --out maps --for bevy           Bevy's files for each panorama
+  kiln env px.png nx.png py.png ny.png pz.png nz.png --faces --out maps
+  kiln env sun.exr --out maps --sun extract --error 1e-4 --format rgba32f
+
+You say which error may remain, not how many samples to take: there are none. What was chosen, the bounds and the
+error measured against brute force stand in manifest.json.")]
+pub(crate) struct EnvArgs {
+    /// Panoramas, cubes, crosses, strips or octahedral maps: .hdr .exr .ktx .ktx2 .dds .png .jpg
+    #[arg(required = true, value_name = "FILE")]
+    pub(crate) files: Vec<PathBuf>,
+    /// Folder of the maps; each environment gets a folder in it
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// The files are six faces of one cube: +X -X +Y -Y +Z -Z
+    #[arg(long)]
+    pub(crate) faces: bool,
+    /// Name of the environment [default: the file's name]
+    #[arg(long)]
+    pub(crate) name: Option<String>,
+    /// Write an engine's files in its conventions instead of Kiln's: bevy, three, filament, khronos or raw
+    #[arg(long = "for", value_name = "ENGINE", value_parser = parse_preset)]
+    pub(crate) preset: Option<kiln_project::Preset>,
+    /// Edge of the specular chain's first level, a power of two
+    #[arg(long, default_value_t = 256)]
+    pub(crate) size: usize,
+    /// Relative RMS error that may remain, encoding included
+    #[arg(long, default_value_t = 1e-3)]
+    pub(crate) error: f64,
+    /// Texels: rgba16f, rgba32f, rgb9e5, r11g11b10f or bc6h [default: rgba16f, or what the engine likes best]
+    #[arg(long)]
+    pub(crate) format: Option<String>,
+    /// How the files are laid out: auto, equirect, cube-strip, cube-cross, octahedral, exr-cube or cube
+    #[arg(long, default_value = "auto")]
+    pub(crate) layout: String,
+    /// Levels of the specular chain [default: down to faces of 4 texels]
+    #[arg(long)]
+    pub(crate) levels: Option<usize>,
+    /// Roughness of the levels: linear, filament, eevee, or a list as 0,0.25,1
+    #[arg(long, default_value = "linear")]
+    pub(crate) law: String,
+    /// Edge of the skybox [default: follows the file]
+    #[arg(long)]
+    pub(crate) skybox_size: Option<usize>,
+    /// Edge of the irradiance cube
+    #[arg(long, default_value_t = 64)]
+    pub(crate) irradiance_size: usize,
+    /// Also a Charlie chain, for cloth
+    #[arg(long)]
+    pub(crate) sheen: bool,
+    /// Highest degree of the spherical harmonics, 0 to 8
+    #[arg(long, default_value_t = 2)]
+    pub(crate) sh_order: usize,
+    /// Window the irradiance's harmonics until they are nowhere negative
+    #[arg(long)]
+    pub(crate) dering: bool,
+    /// Values above 65504: scale (by a recorded power of two) or f32 (32-bit texels)
+    #[arg(long, default_value = "scale")]
+    pub(crate) range: String,
+    /// The dominant small light: keep it, or extract it as a directional light
+    #[arg(long, default_value = "keep")]
+    pub(crate) sun: String,
+    /// NaN, infinite and negative texels: repair, error, or keep (in the skybox alone)
+    #[arg(long, default_value = "repair")]
+    pub(crate) texels: String,
+    /// Cut radiance above this; what is lost is printed
+    #[arg(long)]
+    pub(crate) max_radiance: Option<f64>,
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
+}
+
+#[derive(Debug, ClapArgs)]
+pub(crate) struct ExportArgs {
+    /// The project's folder
+    #[arg(default_value = ".")]
+    pub(crate) dir: PathBuf,
+    /// Whose conventions: bevy, three, filament, khronos or raw
+    #[arg(long = "for", value_name = "ENGINE", value_parser = parse_preset)]
+    pub(crate) preset: kiln_project::Preset,
+    /// Folder of the files; each environment gets a folder in it
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Only these environments
+    #[arg(long = "env", value_name = "NAME")]
+    pub(crate) envs: Vec<String>,
+    /// Texels of cubes [default: what the engine likes best]
+    #[arg(long)]
+    pub(crate) format: Option<String>,
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
 }
 
 /// For commands that only read.

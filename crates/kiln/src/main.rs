@@ -39,6 +39,8 @@ fn main() -> ExitCode {
     let result = match args.command {
         args::Command::Init(args) => commands::init::run(&args),
         args::Command::Bake(args) => commands::bake::run(&args),
+        args::Command::Env(args) => commands::env::run(&args),
+        args::Command::Export(args) => commands::export::run(&args),
         args::Command::Plan(args) => commands::plan::run(&args),
         args::Command::Why(args) => commands::why::run(&args),
         args::Command::Graph(args) => commands::graph::run(&args),

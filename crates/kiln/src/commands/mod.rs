@@ -3,6 +3,8 @@
 pub(crate) mod bake;
 pub(crate) mod demo;
 pub(crate) mod doctor;
+pub(crate) mod env;
+pub(crate) mod export;
 pub(crate) mod gc;
 pub(crate) mod graph;
 pub(crate) mod init;
