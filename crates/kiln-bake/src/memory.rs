@@ -1,7 +1,7 @@
 //! How much memory a step needs at its peak, so that no more steps run at once than fit.
 //!
 //! Upper estimates in bytes. Each counts, beside the step's own work, the input as stored and as decoded, and the result as
-//! texels and as stored, all held to the end. A panorama is stored as `f32`, a map's texel in up to 16 bytes.
+//! texels and as stored, all held to the end. A panorama and a cube are stored as `f32`, a map's texel in up to 16 bytes.
 //! Checked by `tests/memory.rs`: the counted peak of a demanding step lies between a quarter of its estimate and all of it.
 
 use crate::analysis::{BAND_LIMIT_MAX, BRIGHT_MAX};
@@ -20,6 +20,46 @@ pub fn decode(file_bytes: usize) -> usize {
     with_slack(12 * file_bytes)
 }
 
+/// [`kiln_image::decode_environment()`] of a KTX2, KTX1 or DDS file and the texel policy, from the file's length alone.
+///
+/// BC6H has one byte a texel, and that is what the estimate is for: half floats need a fifth of it. A file compressed as a
+/// whole (Zstandard) may need more.
+pub fn decode_container(file_bytes: usize) -> usize {
+    with_slack((1 + 2 * size_of::<[f32; 3]>()) * file_bytes)
+}
+
+/// [`kiln_image::decode_environment()`] of an octahedral map and the texel policy, from the file's length alone; as
+/// [`decode`], for 3 bytes a texel.
+pub fn decode_octahedral(file_bytes: usize) -> usize {
+    // The map; twice as many texels of the panorama, decoded and stored.
+    with_slack((1 + 5 * size_of::<[f32; 3]>() / 3) * file_bytes)
+}
+
+/// [`crate::panorama_of_cube`], stored. Where the analysis follows in the same step and nothing is freed between, it is
+/// this and [`analyse`] of `4 · face_size` × `2 · face_size`.
+pub fn panorama_of_cube(face_size: usize) -> usize {
+    // Made column by column, put together row by row, and stored while the columns may still wait to be freed.
+    with_slack(2 * cube(face_size) + 3 * panorama(4 * face_size, 2 * face_size))
+}
+
+/// [`crate::skybox_of_cube`] with all its levels, from a cube of `source_size`.
+pub fn skybox_of_cube(source_size: usize, face_size: usize) -> usize {
+    let is_halved = source_size.is_multiple_of(face_size) && (source_size / face_size).is_power_of_two();
+    let first = if source_size == face_size {
+        0
+    } else if is_halved {
+        // The source again, and its half.
+        5 * cube(source_size) / 4
+    } else {
+        let map = panorama(4 * source_size, 2 * source_size);
+        map + map.max(skybox_faces(face_size))
+    };
+    // An odd size beyond 1 is halved by way of the panorama.
+    let odd = face_size >> face_size.trailing_zeros();
+    let rest = if is_halved && odd > 1 { 2 * panorama(4 * source_size, 2 * source_size) } else { 0 };
+    with_slack(2 * cube(source_size) + first.max(rest) + skybox_levels(face_size))
+}
+
 /// [`crate::analyse`], for as many degrees as it may choose.
 pub fn analyse(width: usize, height: usize) -> usize {
     // Stored and decoded.
@@ -29,11 +69,7 @@ pub fn analyse(width: usize, height: usize) -> usize {
 
 /// [`crate::skybox`] with all its levels.
 pub fn skybox(width: usize, height: usize, face_size: usize) -> usize {
-    let texels = 6 * face_size * face_size;
-    // Four faces as means, two as sums with their weight.
-    let faces = texels * 2 / 3 * size_of::<[f32; 3]>() + texels / 3 * size_of::<[f64; 4]>();
-    let levels = 4 * (texels * size_of::<[f32; 3]>() + texels * STORED_TEXEL) / 3;
-    with_slack(2 * panorama(width, height) + faces + levels)
+    with_slack(2 * panorama(width, height) + skybox_faces(face_size) + skybox_levels(face_size))
 }
 
 /// [`crate::specular_level`] from an analysis of `analysis_bytes` (at most [`ANALYSIS_BYTES_MAX`]), made for `error`
@@ -53,6 +89,24 @@ pub fn irradiance(analysis_bytes: usize, error: f64, face_size: usize) -> usize 
 /// The larger of the two texel formats.
 const STORED_TEXEL: usize = 16;
 
+/// Four faces as means, two as sums with their weight.
+fn skybox_faces(face_size: usize) -> usize {
+    let texels = 6 * face_size * face_size;
+    texels * 2 / 3 * size_of::<[f32; 3]>() + texels / 3 * size_of::<[f64; 4]>()
+}
+
+/// As texels and as stored.
+fn skybox_levels(face_size: usize) -> usize {
+    let texels = 6 * face_size * face_size;
+    4 * texels * (size_of::<[f32; 3]>() + STORED_TEXEL) / 3
+}
+
+/// A cube's bytes, in memory and as stored.
+fn cube(face_size: usize) -> usize {
+    6 * face_size * face_size * size_of::<[f32; 3]>()
+}
+
+/// A panorama's, likewise.
 fn panorama(width: usize, height: usize) -> usize {
     width * height * size_of::<[f32; 3]>()
 }

@@ -3,9 +3,11 @@
 
 use kiln_bake::{
     Analysis, AnalysisRequest, BAND_LIMIT_MAX, Cancel, TexelFormat, analyse, encode_level, irradiance,
-    memory, skybox, specular_level,
+    memory, panorama_of_cube, skybox, skybox_of_cube, specular_level,
 };
-use kiln_image::{Image, Limits, Panorama, TexelPolicy, hdr};
+use kiln_image::{
+    Cube, Environment, Image, Limits, Panorama, TexelPolicy, Texels, decode_environment, hdr, ktx2,
+};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
@@ -98,13 +100,12 @@ fn panorama(width: usize, height: usize) -> Panorama {
     Panorama::new(Image::new(width, height, rgb).expect("sizes fit")).expect("2:1")
 }
 
-/// A panorama as the store holds it.
-fn stored(map: &Panorama) -> Vec<u8> {
+/// A panorama or a cube as the store holds it.
+fn stored(map: &impl Texels) -> Vec<u8> {
     map.rgb().iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>()
 }
 
 #[test]
-#[expect(clippy::print_stdout, reason = "the figures are what one wants to read")]
 fn estimates_cover_the_counted_peak_and_are_no_more_than_four_times_it() {
     // The small one with the most degrees there are, the large one with fewer, for the time it takes.
     for (width, height, alpha, band_limit_min) in
@@ -167,10 +168,70 @@ fn estimates_cover_the_counted_peak_and_are_no_more_than_four_times_it() {
                 peak_of(|| prefilter(None)),
             ),
         ];
-        for (name, estimate, peak) in steps {
-            println!("{width} x {height} {name}: peak {peak}, estimate {estimate}");
-            assert_eq!(complaint(estimate, peak), None, "{width} x {height} {name}: {peak} of {estimate}");
-        }
+        report(&format!("{width} x {height}"), &steps);
     }
+    cubes();
     assert!(complaint(99, 100).is_some() && complaint(401, 100).is_some(), "the check itself");
+}
+
+#[expect(clippy::print_stdout, reason = "the figures are what one wants to read")]
+fn report(size: &str, steps: &[(&str, usize, usize)]) {
+    for (name, estimate, peak) in steps {
+        println!("{size} {name}: peak {peak}, estimate {estimate}");
+        assert_eq!(complaint(*estimate, *peak), None, "{size} {name}: {peak} of {estimate}");
+    }
+}
+
+/// Steps from a cube, and from files that hold no panorama.
+fn cubes() {
+    let never = Cancel::NEVER;
+    let size = 256;
+    let cube =
+        Cube::new(size, panorama(4 * size, 2 * size).rgb()[..18 * size * size].to_vec()).expect("it fits");
+    let through_panorama = || {
+        let (cube, input) = (cube.clone(), stored(&cube));
+        let map = panorama_of_cube(&cube, never).expect(WANTED);
+        (input, stored(&map), cube, map)
+    };
+    let sky = |face_size: usize| {
+        let (cube, input) = (cube.clone(), stored(&cube));
+        let levels = skybox_of_cube(&cube, face_size, never).expect(WANTED);
+        let encode = |level| encode_level(level, TexelFormat::Rgba16Float, 0, never).expect(WANTED);
+        let encoded: Vec<_> = levels.iter().map(encode).collect();
+        (input, cube, levels, encoded)
+    };
+    let blocks = ktx2::Format::BC6H_UFLOAT_BLOCK;
+    let level = encode_level(&cube, TexelFormat::Bc6hUfloat, 0, never).expect(WANTED).bytes;
+    let container = ktx2::write(&ktx2::Texture {
+        format: blocks,
+        width: size,
+        height: size,
+        faces: 6,
+        levels: vec![&level],
+        key_values: Vec::new(),
+    });
+    let octahedral =
+        hdr::encode(&Image::new(512, 512, panorama(1024, 512).rgb()[..3 << 18].to_vec()).expect("it fits"));
+    let decode = |file: &Vec<u8>, layout: Option<kiln_image::Layout>| {
+        let file = file.clone();
+        let mut decoded = decode_environment(&file, layout, &Limits::default(), never).expect("just encoded");
+        TexelPolicy::Repair.apply(&mut decoded, never).expect(WANTED);
+        let is_cube = matches!(decoded.environment, Environment::Cube(_));
+        assert_eq!(is_cube, layout.is_none());
+        (file, stored(&decoded), decoded)
+    };
+    let steps = [
+        ("panorama", memory::panorama_of_cube(size), peak_of(through_panorama)),
+        ("sky box, same", memory::skybox_of_cube(size, 256), peak_of(|| sky(256))),
+        ("sky box, half", memory::skybox_of_cube(size, 128), peak_of(|| sky(128))),
+        ("sky box, larger", memory::skybox_of_cube(size, 384), peak_of(|| sky(384))),
+        ("sky box, smaller", memory::skybox_of_cube(size, 100), peak_of(|| sky(100))),
+        ("container", memory::decode_container(container.len()), peak_of(|| decode(&container, None))),
+        (
+            "octahedral",
+            memory::decode_octahedral(octahedral.len()),
+            peak_of(|| decode(&octahedral, Some(kiln_image::Layout::Octahedral))),
+        ),
+    ];
+    report("6 x 256 x 256", &steps);
 }

@@ -36,7 +36,6 @@ impl CubeFacts {
             None => "direction (x, y, z)",
             Some(Mirror::X) => "direction (-x, y, z)",
             Some(Mirror::Z) => "direction (x, y, -z)",
-            Some(Mirror::Faces) => "OpenEXR's rule for cube maps",
         };
         let each = |value: fn(&LevelError) -> f64| self.errors.iter().map(value).collect::<Vec<f64>>();
         json!({

@@ -50,7 +50,8 @@ pub(crate) fn package(
     let cube = ExportFile { path: name("cube.exr"), bytes: exr_write::encode_cube(sky, cancel)? };
     facts.push(json!({
         "path": cube.path, "holds": "radiance cube", "format": "OpenEXR, binary32, ZIP, envmap cube",
-        "faces": "+X -X +Y -Y +Z -Z from the top, each unmirrored as seen from inside",
+        "faces": "OpenEXR's +X -X +Y -Y +Z -Z from the top, each unmirrored as seen from inside",
+        "axes": "turned by 180 degrees about +Y, as the panorama is: OpenEXR's +Z is -Z here, its +X is -X",
     }));
     files.extend([panorama, cube]);
 

@@ -9,7 +9,7 @@
 
 use crate::conventions::conventions;
 use crate::{BakedEnvironment, Cancel, ExportError, ExportFile, Preset, sh};
-use kiln_image::cube_layout::{FACE_NAMES, Mirror, face_image, mirror, resample};
+use kiln_image::cube_layout::{FACE_STEMS, Mirror, face_image, mirror, resample};
 use kiln_image::{Panorama, exr_write, hdr};
 use kiln_sphere::panorama_direction;
 use serde_json::json;
@@ -34,7 +34,7 @@ pub(crate) fn package(
         ExportFile { path: format!("{name}.exr"), bytes: exr_write::encode_image(panorama.image(), cancel)? },
     ];
     let mirrored = mirror(sky, Mirror::X);
-    for (face, suffix) in FACE_NAMES.into_iter().enumerate() {
+    for (face, suffix) in FACE_STEMS.into_iter().enumerate() {
         cancel.check()?;
         let bytes = hdr::encode(&face_image(&mirrored, face));
         files.push(ExportFile { path: format!("{name}_{suffix}.hdr"), bytes });
@@ -63,7 +63,7 @@ pub(crate) fn package(
             "encoding_error": 0.0,
         }),
         json!({
-            "path": FACE_NAMES.map(|suffix| format!("{name}_{suffix}.hdr")), "holds": "radiance, six faces for HDRCubeTextureLoader",
+            "path": FACE_STEMS.map(|suffix| format!("{name}_{suffix}.hdr")), "holds": "radiance, six faces for HDRCubeTextureLoader",
             "format": "Radiance RGBE", "face_size": sky.face_size, "lookup": "direction (-x, y, z)",
             "encoding_error": "a channel is off by at most 2^-9 of the texel's brightest one",
         }),

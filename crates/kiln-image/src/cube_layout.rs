@@ -11,7 +11,7 @@
 //!                            −Z, turned by 180°
 //! ```
 
-use crate::{Cancel, Cancelled, Cube, Image};
+use crate::{Cancel, Cancelled, Cube, CubePlacement, Image, Layout, octahedral_direction};
 use kiln_sphere::direction::cube_texel_centre;
 use kiln_sphere::{cube_direction, cube_face_st, panorama_direction};
 
@@ -29,7 +29,7 @@ pub enum CubeLayout {
 }
 
 /// File name stems of six single faces, in KTX2 order.
-pub const FACE_NAMES: [&str; 6] = ["px", "nx", "py", "ny", "pz", "nz"];
+pub const FACE_STEMS: [&str; 6] = ["px", "nx", "py", "ny", "pz", "nz"];
 
 impl CubeLayout {
     /// All of them.
@@ -50,39 +50,23 @@ impl CubeLayout {
         }
     }
 
-    /// Column and row of a face, in faces from the top left.
-    fn cell(self, face: usize) -> [usize; 2] {
-        const HORIZONTAL: [[usize; 2]; 6] = [[2, 1], [0, 1], [1, 0], [1, 2], [1, 1], [3, 1]];
-        match self {
-            CubeLayout::HorizontalCross => HORIZONTAL[face],
-            CubeLayout::VerticalCross if face == 5 => [1, 3],
-            CubeLayout::VerticalCross => HORIZONTAL[face],
-            CubeLayout::HorizontalStrip => [face, 0],
-            CubeLayout::VerticalStrip => [0, face],
-        }
-    }
-
-    /// Pixel of the image that holds a face's texel.
-    pub fn pixel(self, face_size: usize, face: usize, x: usize, y: usize) -> [usize; 2] {
-        let is_turned = self == CubeLayout::VerticalCross && face == 5;
-        let [x, y] = if is_turned { [face_size - 1 - x, face_size - 1 - y] } else { [x, y] };
-        let [column, row] = self.cell(face);
-        [column * face_size + x, row * face_size + y]
+    /// Where the faces stand, as decoding finds them.
+    ///
+    /// # Panics
+    /// If `face_size` is 0.
+    pub fn placement(self, face_size: usize) -> CubePlacement {
+        let layout = match self {
+            CubeLayout::HorizontalCross | CubeLayout::VerticalCross => Layout::CubeCross,
+            CubeLayout::HorizontalStrip | CubeLayout::VerticalStrip => Layout::CubeStrip,
+        };
+        let [width, height] = self.faces().map(|count| count * face_size);
+        CubePlacement::of(layout, width, height).expect("the shape is the layout's")
     }
 }
 
 /// The six faces on one image; what no face covers is black.
 pub fn unfold(cube: &Cube, layout: CubeLayout) -> Image {
-    let size = cube.face_size;
-    let [width, height] = layout.faces().map(|count| count * size);
-    let mut image = Image { width, height, rgb: vec![0.0; width * height * 3] };
-    for face in 0..6 {
-        for (y, x) in (0..size).flat_map(|y| (0..size).map(move |x| (y, x))) {
-            let [column, row] = layout.pixel(size, face, x, y);
-            image.rgb[(row * width + column) * 3..][..3].copy_from_slice(&cube.texel(face, x, y));
-        }
-    }
-    image
+    layout.placement(cube.face_size).unfold(cube)
 }
 
 /// One face as an image.
@@ -100,13 +84,9 @@ pub enum Mirror {
     X,
     /// z ↔ −z.
     Z,
-    /// Each face on its own, so that it looks unmirrored from inside, as OpenEXR stores cubes (`ImfEnvmap.cpp`,
-    /// `CubeMap::pixelPosition`): side faces left to right, caps top to bottom. No direction is mirrored; the
-    /// result is a cube for OpenEXR's rules, not for a GPU's.
-    Faces,
 }
 
-/// The cube that holds, in direction d, what `cube` holds in the mirrored direction (for [`Mirror::Faces`] see there).
+/// The cube that holds, in direction d, what `cube` holds in the mirrored direction.
 pub fn mirror(cube: &Cube, mirror: Mirror) -> Cube {
     let size = cube.face_size;
     let mut rgb = Vec::with_capacity(cube.rgb.len());
@@ -118,8 +98,8 @@ pub fn mirror(cube: &Cube, mirror: Mirror) -> Cube {
                 Mirror::X if face < 2 => (1 - face, flip(x), y),
                 Mirror::X => (face, flip(x), y),
                 Mirror::Z if face > 3 => (9 - face, flip(x), y),
-                Mirror::Z | Mirror::Faces if is_cap => (face, x, flip(y)),
-                Mirror::Z | Mirror::Faces => (face, flip(x), y),
+                Mirror::Z if is_cap => (face, x, flip(y)),
+                Mirror::Z => (face, flip(x), y),
             };
             rgb.extend_from_slice(&cube.texel(from, x, y));
         }
@@ -156,32 +136,6 @@ fn texel_beyond(cube: &Cube, face: usize, x: f64, y: f64) -> [f32; 3] {
     let (face, [s, t]) = cube_face_st(cube_direction(face, centre(x), centre(y)));
     let index = |st: f64| (((st + 1.0) * 0.5 * size).max(0.0) as usize).min(cube.face_size - 1);
     cube.texel(face, index(s), index(t))
-}
-
-/// Unit direction at (`u`, `v`) in [0, 1]² of the octahedral map: +Y in the centre, u towards +X, v (downwards)
-/// towards +Z, −Y at the four corners.
-///
-/// Source: Cigolle et al. 2014, "A Survey of Efficient Representations for Independent Unit Vectors", `oct`, with
-/// this crate's axes.
-pub fn octahedral_direction(u: f64, v: f64) -> [f64; 3] {
-    let (x, z) = (2.0 * u - 1.0, 2.0 * v - 1.0);
-    let y = 1.0 - x.abs() - z.abs();
-    let [x, z] = if y >= 0.0 { [x, z] } else { fold(x, z) };
-    let length = (x * x + y * y + z * z).sqrt();
-    [x / length, y / length, z / length]
-}
-
-/// Position on the octahedral map of a direction of any length but zero; undoes [`octahedral_direction`].
-pub fn octahedral_uv([x, y, z]: [f64; 3]) -> [f64; 2] {
-    let sum = x.abs() + y.abs() + z.abs();
-    let (x, z) = (x / sum, z / sum);
-    let [x, z] = if y >= 0.0 { [x, z] } else { fold(x, z) };
-    [0.5 * (x + 1.0), 0.5 * (z + 1.0)]
-}
-
-/// Between the lower half's triangles and their place around the upper half's square.
-fn fold(x: f64, z: f64) -> [f64; 2] {
-    [libm::copysign(1.0 - z.abs(), x), libm::copysign(1.0 - x.abs(), z)]
 }
 
 /// The cube on a square octahedral map: each texel is [`sample`] at its centre, so make `size` about twice the face

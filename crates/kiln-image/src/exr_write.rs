@@ -3,8 +3,7 @@
 //! Source: "OpenEXR Technical Introduction", section "Environment Maps". Its axes put a panorama's centre at +Z and the
 //! left half at +X; here the same picture has −Z in its centre: Kiln's world is OpenEXR's turned by 180° about Y.
 
-use crate::cube_layout::{self, CubeLayout, Mirror};
-use crate::{Cancel, Cancelled, Cube, Image, Panorama};
+use crate::{Cancel, Cancelled, Cube, CubePlacement, Image, Layout, Panorama};
 use exr::meta::attribute::{Chromaticities, EnvironmentMap};
 use exr::prelude::{Encoding, Layer, LayerAttributes, SpecificChannels, Vec2, WritableImage};
 
@@ -24,16 +23,18 @@ pub fn encode_panorama(panorama: &Panorama, cancel: Cancel) -> Result<Vec<u8>, C
     encode(panorama.image(), Some(EnvironmentMap::LatitudeLongitude), cancel)
 }
 
-/// A cube, `envmap` = cube: six faces in KTX2 order from the top, each seen unmirrored from inside.
+/// A cube, `envmap` = cube: OpenEXR's six faces from the top, each seen unmirrored from inside. They show Kiln's world turned
+/// by 180° about Y, as panoramas do, so that a reader who knows OpenEXR's axes sees both kinds alike ([`Layout::ExrCube`]).
 ///
 /// OpenEXR's own library takes the outermost texels' centres for the cube's edges; here, as nearly everywhere, texels
-/// are cells and their centres lie half a texel inside. The axes are Kiln's (+Y up, right-handed), as OpenEXR's are.
+/// are cells and their centres lie half a texel inside.
 ///
 /// # Errors
 /// As [`encode_image`].
 pub fn encode_cube(cube: &Cube, cancel: Cancel) -> Result<Vec<u8>, Cancelled> {
-    let faces = cube_layout::mirror(cube, Mirror::Faces);
-    encode(&cube_layout::unfold(&faces, CubeLayout::VerticalStrip), Some(EnvironmentMap::Cube), cancel)
+    let size = cube.face_size;
+    let placement = CubePlacement::of(Layout::ExrCube, size, 6 * size).expect("a column of six");
+    encode(&placement.unfold(cube), Some(EnvironmentMap::Cube), cancel)
 }
 
 fn encode(image: &Image, kind: Option<EnvironmentMap>, cancel: Cancel) -> Result<Vec<u8>, Cancelled> {

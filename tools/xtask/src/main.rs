@@ -26,6 +26,7 @@ cargo xtask bench cache           no-op bakes, planning, overhead and hashing on
 cargo xtask bench bake […]        error and cost of prefiltered maps beside a sampled estimator; accuracy, time, sampled: one part
                                   alone; --huge: memory of a 16384×8192 panorama; panoramas from $KILN_CORPUS
 cargo xtask faults [COUNT]        kill COUNT processes at random moments and flip COUNT bits (default 1000)
+cargo xtask fuzz [COUNT] [SEED]   decode COUNT damaged copies of each image file of the tests (default 100000)
 cargo xtask corpus [OUT]          bake and render the files of $KILN_CORPUS into OUT (default target/corpus)
 cargo xtask size                  build with and without the preview and compare time and size
 ";
@@ -41,6 +42,9 @@ fn main() -> ExitCode {
         ["bench", "bake", arguments @ ..] => bench_bake::run(arguments),
         ["faults"] => test::faults("1000"),
         ["faults", count] => test::faults(count),
+        ["fuzz"] => test::fuzz(None, None),
+        ["fuzz", count] => test::fuzz(Some(count), None),
+        ["fuzz", count, seed] => test::fuzz(Some(count), Some(seed)),
         ["bench", edits] => match edits.parse() {
             Ok(edits) => bench::run(edits),
             Err(_) => Err(format!("`{edits}` is no number of edits")),

@@ -51,3 +51,21 @@ pub(crate) fn faults(count: &str) -> Result<(), String> {
     let mut tests = cargo(&["test", "--release", "--workspace", "--", "faults", "--nocapture"]);
     step("faults", tests.env("KILN_FAULTS", count))
 }
+
+/// Mutants of each file, where none are asked for.
+const MUTANTS: &str = "100000";
+
+/// The tests that feed damaged files to the image decoders, with a count and a seed of their own.
+pub(crate) fn fuzz(count: Option<&str>, seed: Option<&str>) -> Result<(), String> {
+    let mut tests = cargo(&["test", "--release", "--workspace", "--lib", "--", "tests::mutation::"]);
+    tests.env("KILN_FUZZ_COUNT", number(count.unwrap_or(MUTANTS))?);
+    match seed {
+        Some(seed) => tests.env("KILN_FUZZ_SEED", number(seed)?),
+        None => tests.env_remove("KILN_FUZZ_SEED"),
+    };
+    step("fuzz", &mut tests)
+}
+
+fn number(text: &str) -> Result<&str, String> {
+    text.parse::<u64>().map(|_| text).map_err(|_| format!("`{text}` is no number"))
+}

@@ -6,11 +6,11 @@ use super::{IDENTITY, Texture, check_texture_size, texel::TexelFormat};
 use crate::{
     Cancel, DecodeError, Limits,
     decode::{Source, guard, too_large},
+    ktx1::IDENTIFIER,
 };
 
 /// The format's name in messages.
 const FORMAT: &str = "KTX1";
-const IDENTIFIER: [u8; 12] = [0xab, b'K', b'T', b'X', b' ', b'1', b'1', 0xbb, b'\r', b'\n', 0x1a, b'\n'];
 /// Identifier and thirteen numbers.
 const HEADER_BYTES: usize = 64;
 /// Rows, faces and levels end at a multiple of it.
@@ -145,7 +145,8 @@ impl GlFormat {
             }
             0x140b | 0x8d61 if !is_bgr => Some(TexelFormat::Half { channels }),
             0x1406 if !is_bgr => Some(TexelFormat::Float { channels }),
-            0x8c3b if channels == 3 && !is_bgr => Some(TexelFormat::B10G11R11),
+            // The second is the internal format's number, which Filament's cmgen writes in its place.
+            0x8c3b | 0x8c3a if channels == 3 && !is_bgr => Some(TexelFormat::B10G11R11),
             0x8c3e if channels == 3 && !is_bgr => Some(TexelFormat::Rgb9E5),
             _ => None,
         }
@@ -155,7 +156,7 @@ impl GlFormat {
     fn type_bytes(&self) -> usize {
         match self.kind {
             0x140b | 0x8d61 => 2,
-            0x1406 | 0x8c3b | 0x8c3e => 4,
+            0x1406 | 0x8c3a | 0x8c3b | 0x8c3e => 4,
             _ => 1,
         }
     }

@@ -3,6 +3,8 @@
 //! Source: Khronos Data Format Specification 1.3, chapters 10 (shared exponent, packed floats) and 20 (BPTC); sRGB as in
 //! IEC 61966-2-1.
 
+use crate::texel::bc6h::{self, BLOCK_BYTES, BLOCK_SIZE};
+use crate::texel::{r11g11b10, rgb9e5};
 use crate::{Cancel, Cancelled, colour::srgb_to_linear};
 use half::f16;
 
@@ -22,11 +24,6 @@ pub(super) enum TexelFormat {
     /// 4 × 4 blocks of 16 bytes.
     Bc6h { is_signed: bool },
 }
-
-/// Bytes of a block of [`TexelFormat::Bc6h`].
-const BLOCK_BYTES: usize = 16;
-/// Texels along a block's edge.
-const BLOCK_SIZE: usize = 4;
 
 impl TexelFormat {
     /// Whether texels come in blocks.
@@ -99,8 +96,12 @@ impl TexelFormat {
                     if is_bgr { [b, g, r] } else { [r, g, b] }
                 }));
             }
-            TexelFormat::B10G11R11 => rgb.extend(texels.flat_map(|texel| b10g11r11(word(texel)))),
-            TexelFormat::Rgb9E5 => rgb.extend(texels.flat_map(|texel| rgb9e5(word(texel)))),
+            TexelFormat::B10G11R11 => {
+                rgb.extend(bytes.as_chunks().0.iter().flat_map(|&texel| r11g11b10::decode(texel)));
+            }
+            TexelFormat::Rgb9E5 => {
+                rgb.extend(bytes.as_chunks().0.iter().flat_map(|&texel| rgb9e5::decode(texel)));
+            }
             TexelFormat::Bc6h { .. } => {}
         }
     }
@@ -114,22 +115,19 @@ impl TexelFormat {
         rgb: &mut Vec<f32>,
         cancel: Cancel,
     ) -> Result<(), Cancelled> {
-        const BLOCK_STRIDE: usize = 3 * BLOCK_SIZE;
         let is_signed = self == TexelFormat::Bc6h { is_signed: true };
         let start = rgb.len();
         rgb.resize(start + width * height * 3, 0.0);
         let blocks_per_row = width.div_ceil(BLOCK_SIZE);
         for (row, blocks) in bytes.chunks_exact(blocks_per_row * BLOCK_BYTES).enumerate() {
             cancel.check()?;
-            for (column, block) in blocks.chunks_exact(BLOCK_BYTES).enumerate() {
-                let mut halves = [0_u16; BLOCK_SIZE * BLOCK_STRIDE];
-                bcdec_rs::bc6h_half(block, &mut halves, BLOCK_STRIDE, is_signed);
+            for (column, &block) in blocks.as_chunks::<BLOCK_BYTES>().0.iter().enumerate() {
+                let texels = bc6h::decode_block(block, is_signed);
                 let (x, y) = (column * BLOCK_SIZE, row * BLOCK_SIZE);
                 let length = 3 * (width - x).min(BLOCK_SIZE);
-                for (line, values) in halves.chunks_exact(BLOCK_STRIDE).take(height - y).enumerate() {
+                for (line, values) in texels.chunks_exact(BLOCK_SIZE).take(height - y).enumerate() {
                     let to = start + ((y + line) * width + x) * 3;
-                    let texels = rgb[to..to + length].iter_mut().zip(values);
-                    texels.for_each(|(texel, &value)| *texel = f16::from_bits(value).to_f32());
+                    rgb[to..to + length].copy_from_slice(&values.as_flattened()[..length]);
                 }
             }
         }
@@ -139,20 +137,4 @@ impl TexelFormat {
 
 fn first_three(channels: usize, value: impl Fn(usize) -> f32) -> [f32; 3] {
     [0, 1, 2].map(|channel| if channel < channels { value(channel) } else { 0.0 })
-}
-
-fn word(texel: &[u8]) -> u32 {
-    u32::from_le_bytes([texel[0], texel[1], texel[2], texel[3]])
-}
-
-/// The small floats have binary16's exponent and its upper mantissa bits.
-fn b10g11r11(word: u32) -> [f32; 3] {
-    let float = |bits: u32| f16::from_bits(bits as u16).to_f32();
-    [float((word & 0x7ff) << 4), float((word >> 11 & 0x7ff) << 4), float((word >> 22) << 5)]
-}
-
-fn rgb9e5(word: u32) -> [f32; 3] {
-    // Bias 15, mantissas without a leading one: exact in binary32.
-    let scale = libm::ldexp(1.0, (word >> 27) as i32 - 15 - 9) as f32;
-    [0, 9, 18].map(|shift| (word >> shift & 0x1ff) as f32 * scale)
 }

@@ -4,6 +4,8 @@ use super::Layout;
 use crate::{Bulk, Cancel, Cube, DecodeError, Image, Limits, decode::check_size};
 
 /// Names of the faces, in KTX2 order.
+///
+/// Those of six single files stand in [`cube_layout::FACE_STEMS`](crate::cube_layout::FACE_STEMS).
 pub const FACE_NAMES: [&str; 6] = ["+X", "-X", "+Y", "-Y", "+Z", "-Z"];
 
 /// One face in a flat image.
@@ -79,6 +81,24 @@ impl CubePlacement {
         let size = self.face_size;
         let turned = |index: usize, flip: bool| if flip { size - 1 - index } else { index };
         [square[0] * size + turned(x, flip_x), square[1] * size + turned(y, flip_y)]
+    }
+
+    /// The image on which a cube's faces stand so; what no face covers is black. Undone by decoding it.
+    ///
+    /// # Panics
+    /// If the cube is of another size.
+    pub fn unfold(&self, cube: &Cube) -> Image {
+        let size = self.face_size;
+        assert_eq!(cube.face_size, size, "faces are placed for their size");
+        let [width, height] = self.squares.map(|count| count * size);
+        let mut image = Image { width, height, rgb: vec![0.0; width * height * 3] };
+        for face in 0..6 {
+            for (y, x) in (0..size).flat_map(|y| (0..size).map(move |x| (y, x))) {
+                let [column, row] = self.texel(face, x, y);
+                image.rgb[(row * width + column) * 3..][..3].copy_from_slice(&cube.texel(face, x, y));
+            }
+        }
+        image
     }
 
     /// Copies the faces out of the image they stand in.

@@ -73,7 +73,8 @@ pub struct Texture<'a> {
 }
 
 impl Format {
-    const ALL: [Format; 10] = [
+    /// All of them.
+    pub const ALL: [Format; 10] = [
         Format::R8G8B8A8_UNORM,
         Format::R16G16_SFLOAT,
         Format::R16G16B16_SFLOAT,

@@ -1,11 +1,8 @@
 //! Layouts by direction: what a reader of each layout sees towards a direction is what the cube holds there.
 
 use super::{Random, check_within};
-use crate::cube_layout::{
-    CubeLayout, Mirror, equirect, mirror, octahedral, octahedral_direction, octahedral_uv, sample,
-    texel_direction, unfold,
-};
-use crate::{Cancel, Cancelled, Cube};
+use crate::cube_layout::{CubeLayout, Mirror, equirect, mirror, octahedral, sample, texel_direction, unfold};
+use crate::{Cancel, Cancelled, Cube, CubePlacement, Layout, octahedral_direction, octahedral_uv};
 use kiln_sphere::{cube_direction, cube_face_st, panorama_direction, panorama_uv};
 use std::sync::atomic::AtomicI64;
 
@@ -55,7 +52,7 @@ fn crosses_and_strips_hold_each_texel_where_they_say() {
         assert_eq!([image.width, image.height], layout.faces().map(|count| count * 4));
         let mut filled = 0;
         for (face, y, x) in (0..6).flat_map(|f| (0..4).flat_map(move |y| (0..4).map(move |x| (f, y, x)))) {
-            let [column, row] = layout.pixel(4, face, x, y);
+            let [column, row] = layout.placement(4).texel(face, x, y);
             assert_eq!(image.texel(column, row), cube.texel(face, x, y));
             filled += 1;
         }
@@ -178,11 +175,12 @@ fn openexr_direction(face: usize, column: f64, row: f64) -> [f64; 3] {
 #[test]
 fn openexr_faces_follow_the_rule_of_openexr() {
     let source = cube(5, colour);
-    let faces = mirror(&source, Mirror::Faces);
+    let column = CubePlacement::of(Layout::ExrCube, 5, 30).expect("a column").unfold(&source);
     for (face, y, x) in (0..6).flat_map(|f| (0..5).flat_map(move |y| (0..5).map(move |x| (f, y, x)))) {
         let centre = |index: usize| (2 * index + 1) as f64 / 5.0 - 1.0;
-        let direction = openexr_direction(face, centre(x), centre(y));
-        assert_eq!(faces.texel(face, x, y).map(f64::from), point_sample(&source, direction));
+        // OpenEXR's +Z is our -Z, its +X our -X.
+        let [dx, dy, dz] = openexr_direction(face, centre(x), centre(y));
+        assert_eq!(column.texel(x, 5 * face + y).map(f64::from), point_sample(&source, [-dx, dy, -dz]));
     }
     let plain = cube_direction(0, 0.2, 0.4);
     assert_ne!(

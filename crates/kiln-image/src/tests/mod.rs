@@ -15,6 +15,7 @@ mod ktx2;
 mod ktx2_rules;
 mod layout;
 mod mutation;
+mod round_trips;
 mod sheet;
 mod texel;
 mod texels;

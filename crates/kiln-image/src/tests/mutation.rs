@@ -1,6 +1,6 @@
 //! Seeded damage: decoders answer, they never panic, hang or return what was not asked for.
 //!
-//! `KILN_FUZZ_COUNT=1000000 cargo test --release -p kiln-image mutation` makes a long run of it; `KILN_FUZZ_SEED` another one.
+//! `cargo xtask fuzz 1000000 7` makes a long run of it, with another seed (`KILN_FUZZ_COUNT`, `KILN_FUZZ_SEED`).
 
 use super::{Random, containers, exr_files::half_size_chroma};
 use crate::{

@@ -75,30 +75,36 @@ fn every_finite_r11g11b10_channel_comes_back_and_others_go_to_the_nearest() {
     }
 }
 
-fn second_reader(block: [u8; 16]) -> bc6h::Texels {
+fn second_reader(block: [u8; 16], is_signed: bool) -> bc6h::Texels {
     let mut rgb = [0.0_f32; 48];
-    bcdec_rs::bc6h_float(&block, &mut rgb, 12, false);
+    bcdec_rs::bc6h_float(&block, &mut rgb, 12, is_signed);
     std::array::from_fn(|texel| [rgb[3 * texel], rgb[3 * texel + 1], rgb[3 * texel + 2]])
 }
 
 #[test]
 fn any_bc6h_block_reads_as_another_decoder_reads_it() {
     let mut random = Random(2);
-    let mut modes = [0; 32];
+    let (mut modes, mut differing) = ([0; 32], 0);
     for _ in 0..50_000 {
         let block: [u8; 16] = std::array::from_fn(|_| random.next() as u8);
         modes[usize::from(block[0] & 31)] += 1;
-        let (ours, theirs) = (bc6h::decode_block(block), second_reader(block));
-        assert_eq!(ours.map(|t| t.map(f32::to_bits)), theirs.map(|t| t.map(f32::to_bits)), "{block:02x?}");
+        let [unsigned, signed] = [false, true].map(|is_signed| {
+            let bits = |texels: bc6h::Texels| texels.map(|texel| texel.map(f32::to_bits));
+            let ours = bits(bc6h::decode_block(block, is_signed));
+            assert_eq!(ours, bits(second_reader(block, is_signed)), "{is_signed}: {block:02x?}");
+            ours
+        });
+        differing += usize::from(unsigned != signed);
     }
     assert!(modes.iter().all(|&count| count > 1000), "every mode was met");
+    assert!(differing > 25_000, "the check itself: signs matter");
 }
 
 /// Relative RMS and largest error, relative to value + mean.
 fn bc6h_error(texels: &bc6h::Texels) -> f64 {
     let block = bc6h::encode_block(texels);
-    let back = second_reader(block);
-    assert_eq!(back, bc6h::decode_block(block));
+    let back = second_reader(block, false);
+    assert_eq!(back, bc6h::decode_block(block, false));
     let (back, texels) = (back.as_flattened(), texels.as_flattened());
     let change2: f64 = back.iter().zip(texels).map(|(a, b)| f64::from(a - b).powi(2)).sum();
     let size2: f64 = texels.iter().map(|&v| f64::from(v).powi(2)).sum();
@@ -140,8 +146,8 @@ fn bc6h_never_panics_and_every_result_decodes_to_finite_values() {
             })
         });
         let block = bc6h::encode_block(&texels);
-        assert!(bc6h::decode_block(block).as_flattened().iter().all(|v| v.is_finite() && *v >= 0.0));
-        assert_eq!(bc6h::decode_block(block), second_reader(block));
+        assert!(bc6h::decode_block(block, false).as_flattened().iter().all(|v| v.is_finite() && *v >= 0.0));
+        assert_eq!(bc6h::decode_block(block, false), second_reader(block, false));
     }
 }
 

@@ -57,9 +57,9 @@ fn exr_cube_holds_six_faces_below_each_other() {
     assert_eq!(environment(&bytes), Some(EnvironmentMap::Cube));
     let (size, texels) = read_exr(bytes);
     assert_eq!(size, [4, 24]);
-    // +X is mirrored left to right, +Y top to bottom.
-    assert_eq!(texels[0], cube.texel(0, 3, 0));
-    assert_eq!(texels[2 * 16], cube.texel(2, 0, 3));
+    // OpenEXR's +X is our -X; side faces and, after half a turn, caps are mirrored left to right.
+    assert_eq!(texels[0], cube.texel(1, 3, 0));
+    assert_eq!(texels[2 * 16], cube.texel(2, 3, 0));
 }
 
 #[test]

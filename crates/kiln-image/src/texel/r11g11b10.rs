@@ -3,6 +3,8 @@
 //! Source: Khronos, "Vulkan Specification", sections "Unsigned 11-Bit" and "Unsigned 10-Bit Floating-Point Numbers"
 //! (`VK_FORMAT_B10G11R11_UFLOAT_PACK32`, GL's `R11F_G11F_B10F`): 5 exponent bits, bias 15, and 6, 6, 5 mantissa bits.
 
+use half::f16;
+
 /// Largest values of red, green and blue.
 pub const MAX: [f32; 3] = [65024.0, 65024.0, 64512.0];
 
@@ -35,15 +37,7 @@ fn channel_bits(value: f64, mantissa_bits: i32, max: f32) -> u32 {
 /// The values of one texel; infinite and NaN patterns come out as such.
 pub fn decode(bytes: [u8; 4]) -> [f32; 3] {
     let word = u32::from_le_bytes(bytes);
-    std::array::from_fn(|channel| {
-        let mantissa_bits = MANTISSA_BITS[channel];
-        let bits = (word >> SHIFTS[channel]) & ((1 << (mantissa_bits + 5)) - 1);
-        let (exponent, mantissa) = ((bits >> mantissa_bits) as i32, bits & ((1 << mantissa_bits) - 1));
-        match (exponent, mantissa) {
-            (0, _) => libm::ldexpf(mantissa as f32, EXPONENT_MIN - mantissa_bits),
-            (31, 0) => f32::INFINITY,
-            (31, _) => f32::NAN,
-            _ => libm::ldexpf((mantissa + (1 << mantissa_bits)) as f32, exponent - 15 - mantissa_bits),
-        }
-    })
+    // They have binary16's exponent and its upper mantissa bits.
+    let float = |bits: u32| f16::from_bits(bits as u16).to_f32();
+    [float((word & 0x7ff) << 4), float((word >> 11 & 0x7ff) << 4), float((word >> 22) << 5)]
 }

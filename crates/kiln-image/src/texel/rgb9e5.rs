@@ -32,6 +32,7 @@ pub fn encode(rgb: [f64; 3]) -> [u8; 4] {
 /// The values of one texel; every pattern is valid.
 pub fn decode(bytes: [u8; 4]) -> [f32; 3] {
     let word = u32::from_le_bytes(bytes);
-    let exponent = (word >> 27) as i32 - BIAS - MANTISSA_BITS;
-    [word, word >> 9, word >> 18].map(|bits| libm::ldexpf((bits & 0x1ff) as f32, exponent))
+    // Mantissas without a leading one and a power of two: exact in binary32.
+    let scale = libm::ldexpf(1.0, (word >> 27) as i32 - BIAS - MANTISSA_BITS);
+    [word, word >> 9, word >> 18].map(|bits| (bits & 0x1ff) as f32 * scale)
 }

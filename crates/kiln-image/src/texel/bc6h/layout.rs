@@ -170,6 +170,18 @@ pub(super) fn unquantise(value: i32, bits: u32) -> i32 {
     }
 }
 
+/// The same of a signed format, in −32767 … 32767.
+pub(super) fn unquantise_signed(value: i32, bits: u32) -> i32 {
+    let unused = 32 - bits;
+    let value = value << unused >> unused; // sign extension
+    let magnitude = match value.abs() {
+        magnitude if bits >= 16 || magnitude == 0 => magnitude,
+        magnitude if magnitude >= (1 << (bits - 1)) - 1 => 0x7fff,
+        magnitude => ((magnitude << 15) + 0x4000) >> (bits - 1),
+    };
+    if value < 0 { -magnitude } else { magnitude }
+}
+
 /// A block's fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Block {

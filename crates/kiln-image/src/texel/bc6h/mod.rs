@@ -1,4 +1,4 @@
-//! BC6H, unsigned: blocks of 4×4 texels in 16 bytes, half floats, no alpha.
+//! BC6H: blocks of 4×4 texels in 16 bytes, half floats, no alpha. Written unsigned, read signed too.
 //!
 //! Source: Khronos "Data Format Specification 1.3", section "BC6H" (the tables of modes and partitions are in
 //! `layout.rs`). Each of the block's one or two regions is a line of 16 or 8 colours; 14 modes trade the precision of
@@ -11,7 +11,7 @@ pub use encode::encode_block;
 
 use crate::{Cancel, Cancelled};
 use half::f16;
-use layout::{Block, MODES, WEIGHTS_3, WEIGHTS_4, region_of, unquantise};
+use layout::{Block, MODES, WEIGHTS_3, WEIGHTS_4, region_of, unquantise, unquantise_signed};
 
 /// Bytes of a block.
 pub const BLOCK_BYTES: usize = 16;
@@ -64,7 +64,7 @@ pub fn encode(width: usize, height: usize, rgb: &[f32], cancel: Cancel) -> Resul
     Ok(bytes)
 }
 
-/// Decodes an image; `None` where `bytes` are not its blocks.
+/// Decodes an unsigned image; `None` where `bytes` are not its blocks.
 pub fn decode(width: usize, height: usize, bytes: &[u8]) -> Option<Vec<f32>> {
     let (columns, rows) = (block_count(width), block_count(height));
     let expected = columns.checked_mul(rows)?.checked_mul(BLOCK_BYTES)?;
@@ -74,7 +74,7 @@ pub fn decode(width: usize, height: usize, bytes: &[u8]) -> Option<Vec<f32>> {
     let mut rgb = vec![0.0; width * height * 3];
     for (index, &block) in bytes.as_chunks::<BLOCK_BYTES>().0.iter().enumerate() {
         let (left, top) = (index % columns * BLOCK_SIZE, index / columns * BLOCK_SIZE);
-        for (texel, value) in decode_block(block).into_iter().enumerate() {
+        for (texel, value) in decode_block(block, false).into_iter().enumerate() {
             let (x, y) = (left + texel % BLOCK_SIZE, top + texel / BLOCK_SIZE);
             if x < width && y < height {
                 rgb[(y * width + x) * 3..][..3].copy_from_slice(&value);
@@ -85,9 +85,11 @@ pub fn decode(width: usize, height: usize, bytes: &[u8]) -> Option<Vec<f32>> {
 }
 
 /// The texels of a block; the four reserved modes are black, as the specification says.
-pub fn decode_block(bytes: [u8; BLOCK_BYTES]) -> Texels {
+pub fn decode_block(bytes: [u8; BLOCK_BYTES], is_signed: bool) -> Texels {
     let Some(block) = Block::from_bytes(bytes) else { return [[0.0; 3]; 16] };
     let mode = &MODES[block.mode];
+    let unquantise = if is_signed { unquantise_signed } else { unquantise };
+    let finish = if is_signed { finish_signed } else { finish };
     let ends = block.ends.map(|end| end.map(|value| unquantise(value, mode.bits)));
     std::array::from_fn(|texel| {
         let region = region_of(block.partition, texel, mode.regions);
@@ -108,4 +110,10 @@ fn mix(a: i32, b: i32, weight: i32) -> i32 {
 /// The half float that a mixed value stands for.
 fn finish(value: i32) -> u16 {
     ((value * 31) >> 6) as u16
+}
+
+/// The same of a signed format: sign and magnitude, 0 without a sign.
+fn finish_signed(value: i32) -> u16 {
+    let magnitude = ((value.abs() * 31) >> 5) as u16;
+    if value < 0 && magnitude > 0 { magnitude | 0x8000 } else { magnitude }
 }
