@@ -2,8 +2,10 @@
 
 mod cancelled_step_ends_soon;
 mod dering;
+mod determinism;
 mod encodings;
 mod environments;
+mod laws;
 mod measure;
 mod recipes;
 mod sun;
