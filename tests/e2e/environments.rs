@@ -122,11 +122,11 @@ fn cube_in_every_layout_gives_the_same_skybox() {
         let mut arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
         arguments.extend(["--out", "maps", "--size", "16", "--format", "rgba32f"]);
         desk.bake(&arguments);
-        assert_eq!(desk.cube("maps/cube/skybox.ktx2"), cube, "{arguments:?}");
+        assert!(desk.cube("maps/cube/skybox.ktx2") == cube, "{arguments:?}");
     }
     // The check itself: one face mirrored is another cube.
     let mirrored = cube_layout::mirror(&cube, cube_layout::Mirror::X);
-    assert_ne!(mirrored, cube);
+    assert!(mirrored != cube);
 }
 
 #[test]
