@@ -57,10 +57,10 @@ fn inconstant(cube: &Cube, rgb: [f64; 3]) -> usize {
 #[test]
 fn constant_map_is_constant_to_1e_6_in_every_mip_of_every_chain() {
     let rgb = [0.3, 1.0, 1e4];
-    for width in [1024, 10] {
+    for width in [256, 10] {
         let map = panorama(width, width / 2, |_| rgb.map(|value| value as f32));
         let rgb = rgb.map(|value: f64| f64::from(value as f32));
-        for error in [1e-2, 1e-3, 1e-5] {
+        for error in [1e-3, 1e-5] {
             let analysis = analyse(&map, &AnalysisRequest { alpha_min: 1.0 / 64.0, error, ..REQUEST });
             for level in 1..=6 {
                 let alpha = (f64::from(level) / 6.0).powi(2);
@@ -289,7 +289,7 @@ fn bright_texels_convolved_directly_are_as_by_the_transform() {
     let analysis = analyse(&map, &REQUEST);
     assert!(!analysis.bright.is_empty(), "a sun must go through the other door");
     // The horizon's tail of a sun ends slowly.
-    let transformed = without_bright(&map, &analysis, 1200);
+    let transformed = without_bright(&map, &analysis, 600);
     for lobe in LOBES {
         let [direct, all] = [&analysis, &transformed].map(|analysis| bake(analysis, lobe, 6).cube);
         let peak = direct.rgb.iter().fold(0.0, |a: f32, &b| a.max(b));
