@@ -9,6 +9,7 @@ mod bake;
 mod ci;
 mod corpus;
 mod demo;
+mod environments;
 mod faults;
 #[cfg(feature = "preview")]
 mod golden;

@@ -11,8 +11,9 @@ use std::f64::consts::PI;
 /// Highest band limit [`analyse`] chooses: GGX of α = 1/256 to 1e-4. Beyond it memory, not time, is the limit
 /// (counted: about 0.9 GB while a map of all its degrees is made).
 pub const BAND_LIMIT_MAX: usize = 2047;
-/// Most texels that are convolved directly: a sun of 0.53° covers 28 texels of a panorama 4096 wide, 450 of the largest.
-pub const BRIGHT_MAX: usize = 512;
+/// Most texels that are convolved directly: a sun of 0.53° covers 28 texels of a panorama 4096 wide, 450 of the largest,
+/// but at the zenith all texels of the first row of one 1024 wide.
+pub const BRIGHT_MAX: usize = 2048;
 /// Degrees kept of the whole environment, bright texels included, for [`crate::sh`].
 pub(crate) const LOW_BAND_LIMIT: usize = 8;
 

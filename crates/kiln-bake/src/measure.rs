@@ -190,11 +190,12 @@ impl BruteForce {
             probes.iter().map(|&index| texel_direction(cube.face_size, index)).collect();
         let exact = self.sum(profile, &axes, cancel)?;
         for ((&index, axis), exact) in probes.iter().zip(axes).zip(exact) {
-            for channel in 0..3 {
-                let error = f64::from(cube.rgb[3 * index + channel]) - exact[channel];
+            let values = &cube.rgb[3 * index..3 * index + 3];
+            for ((&value, exact), mean) in values.iter().zip(exact).zip(self.mean) {
+                let error = f64::from(value) - exact;
                 error2 += error * error;
-                size2 += exact[channel] * exact[channel];
-                let local = exact[channel].abs() + 0.01 * self.mean[channel].abs();
+                size2 += exact * exact;
+                let local = exact.abs() + 0.01 * mean.abs();
                 let relative = if error == 0.0 { 0.0 } else { error.abs() / local };
                 // NaN is worse than anything.
                 if !worst.0.is_nan() && (relative > worst.0 || relative.is_nan()) {

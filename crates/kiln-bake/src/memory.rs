@@ -6,6 +6,7 @@
 
 use crate::analysis::{BAND_LIMIT_MAX, BRIGHT_MAX};
 use crate::bytes::byte_count;
+use crate::prefilter::error_share;
 use kiln_sphere::{analyse_bytes, synthesise_cube_bytes};
 
 /// Size of the largest analysis ([`crate::Analysis::to_bytes`]), for where it is not made yet.
@@ -76,6 +77,7 @@ pub fn skybox(width: usize, height: usize, face_size: usize) -> usize {
 /// ([`crate::AnalysisRequest`]).
 pub fn specular_level(analysis_bytes: usize, error: f64, alpha: f64, face_size: usize) -> usize {
     let texels = 6 * face_size * face_size;
+    let error = error * error_share(face_size);
     let band_limit = band_limit(analysis_bytes).min(band_limit_needed(alpha, error));
     let map = texels * (size_of::<[f32; 3]>() + STORED_TEXEL);
     with_slack(2 * analysis_bytes + synthesise_cube_bytes(band_limit, face_size) + map)
@@ -127,10 +129,10 @@ const CONTRAST_MAX: f64 = 30.0;
 /// Degrees a map uses at most, whatever is known.
 ///
 /// The lobe makes |κ_l| ≈ x K_1(x) with x = 2αl, 3e-9 at x = 22. The horizon adds no more than Lambert's 1.6 l^(−5/2). A map
-/// takes all degrees L if by them alone its error can exceed a quarter of `error`: with Σ_{l > L} κ_l² (2l + 1)/4π ≈ 0.14/L³
-/// (see `Truncation::choose`) that ends at L = 1.9 √(contrast/error).
+/// takes all degrees L if by them alone its error can exceed `error`: with Σ_{l > L} κ_l² (2l + 1)/4π ≈ 0.14/L³
+/// (see `Truncation::choose`) that ends at L = 0.95 √(contrast/error).
 fn band_limit_needed(alpha: f64, error: f64) -> usize {
     let lobe = 11.0 / alpha.clamp(crate::ALPHA_MIN, 1.0);
-    let horizon = 1.9 * (CONTRAST_MAX / error).sqrt();
+    let horizon = 0.95 * (CONTRAST_MAX / error).sqrt();
     lobe.max(horizon) as usize
 }

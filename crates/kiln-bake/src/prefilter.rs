@@ -93,7 +93,7 @@ fn prefilter(
 ) -> Result<Prefiltered, Cancelled> {
     let lobe = usable(lobe);
     let kernel = lobe.kernel(analysis.band_limit(), cancel)?;
-    let truncation = Truncation::choose(analysis, &kernel, cancel)?;
+    let truncation = Truncation::choose(analysis, &kernel, error_share(face_size), cancel)?;
     let kappa = &kernel.kappa[..=truncation.band_limit];
     let interpolation = interpolation(analysis.error);
     let mut values = synthesise_cube(&analysis.dim, kappa, face_size, interpolation, cancel)?;
@@ -181,6 +181,14 @@ fn rule_error(error: f64) -> f64 {
     (0.05 * error).clamp(1e-9, 1e-4)
 }
 
+/// What a map's degrees may leave of the error asked for.
+///
+/// It is the RMS over the sphere, but the texels of a face of one look straight along the axes, and there what was left
+/// out adds up: their horizons are the edges of rows and columns (measured, up to 5 times the RMS).
+pub(crate) fn error_share(face_size: usize) -> f64 {
+    if face_size == 1 { 0.08 } else { 0.25 }
+}
+
 /// The cheapest that is little beside the error asked for.
 fn interpolation(error: f64) -> Interpolation {
     if error >= 5e-4 { Interpolation::Coarse } else { Interpolation::Fine }
@@ -210,8 +218,8 @@ struct Truncation {
 }
 
 impl Truncation {
-    /// The fewest degrees that leave a quarter of the error asked for.
-    fn choose(analysis: &Analysis, kernel: &Kernel, cancel: Cancel) -> Result<Self, Cancelled> {
+    /// The fewest degrees that leave `share` of the error asked for.
+    fn choose(analysis: &Analysis, kernel: &Kernel, share: f64, cancel: Cancel) -> Result<Self, Cancelled> {
         let energies = analysis.dim.band_energies(cancel)?;
         let last = energies.len() - 1;
         let map_energy = scaled_energy(&kernel.kappa, &analysis.low.band_energies(cancel)?);
@@ -221,7 +229,7 @@ impl Truncation {
         // κ_l² (2l + 1)/4π ≤ tail for each l beyond.
         let mut energy = unknown * tail * 4.0 * PI / (2 * last + 3) as f64;
         let mut sup = (unknown * tail).sqrt();
-        let allowed = (0.25 * analysis.error).powi(2) * map_energy;
+        let allowed = (share * analysis.error).powi(2) * map_energy;
         let mut band_limit = last;
         while band_limit > 0 {
             let (kappa, band) = (kernel.kappa[band_limit], energies[band_limit]);

@@ -3,8 +3,10 @@
 mod cancelled_step_ends_soon;
 mod cubes;
 mod dering;
+mod determinism;
 mod encodings;
 mod environments;
+mod laws;
 mod measure;
 mod recipes;
 mod sun;

@@ -1,6 +1,7 @@
 //! What the targets of a revision say about themselves.
 
 use kiln_diagnostic::Diagnostic;
+use kiln_image::ktx2;
 use kiln_link::Target;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -84,15 +85,34 @@ pub(crate) enum TexelFormat {
     Rgba32F,
     Rg16F,
     Rg32F,
+    Rgb9e5,
+    R11g11b10F,
+    Bc6h,
 }
 
 impl TexelFormat {
+    /// The container's name of a format whose texels are no plain channels.
+    pub fn packed(self) -> Option<ktx2::Format> {
+        match self {
+            TexelFormat::Rgb9e5 => Some(ktx2::Format::E5B9G9R9_UFLOAT_PACK32),
+            TexelFormat::R11g11b10F => Some(ktx2::Format::B10G11R11_UFLOAT_PACK32),
+            TexelFormat::Bc6h => Some(ktx2::Format::BC6H_UFLOAT_BLOCK),
+            _ => None,
+        }
+    }
+
+    /// The plain format that packed texels are shown in: not every device reads them.
+    pub fn unpacked(self) -> Self {
+        if self.packed().is_some() { TexelFormat::Rgba16F } else { self }
+    }
+
     /// Bytes of a texel.
     pub fn bytes(self) -> u64 {
         match self {
             TexelFormat::Rgba32F => 16,
             TexelFormat::Rgba16F | TexelFormat::Rg32F => 8,
-            TexelFormat::Rg16F => 4,
+            TexelFormat::Rg16F | TexelFormat::Rgb9e5 | TexelFormat::R11g11b10F => 4,
+            TexelFormat::Bc6h => 1,
         }
     }
 
@@ -101,6 +121,7 @@ impl TexelFormat {
         match self {
             TexelFormat::Rgba16F | TexelFormat::Rgba32F => 4,
             TexelFormat::Rg16F | TexelFormat::Rg32F => 2,
+            TexelFormat::Rgb9e5 | TexelFormat::R11g11b10F | TexelFormat::Bc6h => 3,
         }
     }
 
@@ -121,7 +142,10 @@ impl TexelFormat {
     /// wgpu's name.
     pub fn wgpu(self) -> wgpu::TextureFormat {
         match self {
-            TexelFormat::Rgba16F => wgpu::TextureFormat::Rgba16Float,
+            // Packed texels are unpacked before they are uploaded.
+            TexelFormat::Rgba16F | TexelFormat::Rgb9e5 | TexelFormat::R11g11b10F | TexelFormat::Bc6h => {
+                wgpu::TextureFormat::Rgba16Float
+            }
             TexelFormat::Rgba32F => wgpu::TextureFormat::Rgba32Float,
             TexelFormat::Rg16F => wgpu::TextureFormat::Rg16Float,
             TexelFormat::Rg32F => wgpu::TextureFormat::Rg32Float,

@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use half::f16;
 use kiln_diagnostic::Diagnostic;
 use kiln_gpu::Gpu;
+use kiln_image::ktx2;
 use kiln_link::{Revision, Target};
 use kiln_scene::{Image8, Sampler, Wrap};
 
@@ -47,15 +48,15 @@ impl CubeTexture {
             ))
             .with_note(format!("this device takes sizes 1 to {limit} and at most log2(size) + 1 levels")));
         }
-        if meta.format.channels() != 4 {
+        let format = meta.format.unpacked();
+        if format.channels() != 4 {
             return Err(Diagnostic::error(format!("cube `{name}` has texels of format {:?}", meta.format)));
         }
         let parts = read_levels(name, target, revision, meta)?;
-        let extra_log2 = if filterable(gpu, meta.format) == meta.format { 0 } else { overflow_log2(&parts) };
-        let texture =
-            create_texture(gpu, name, meta.size, 6, meta.levels, filterable(gpu, meta.format).wgpu());
+        let extra_log2 = if filterable(gpu, format) == format { 0 } else { overflow_log2(&parts) };
+        let texture = create_texture(gpu, name, meta.size, 6, meta.levels, filterable(gpu, format).wgpu());
         for (level, texels) in &parts {
-            let texels = convert(texels, meta.format, filterable(gpu, meta.format), extra_log2);
+            let texels = convert(texels, format, filterable(gpu, format), extra_log2);
             write_level(gpu, &texture, *level, &texels);
         }
         Ok(CubeTexture {
@@ -161,20 +162,39 @@ fn read_levels<'a>(
     target: &Target,
     revision: &'a Revision,
     meta: &CubeMeta,
-) -> Result<Vec<(u32, &'a [u8])>, Diagnostic> {
+) -> Result<Vec<(u32, Cow<'a, [u8]>)>, Diagnostic> {
     let mut levels = Vec::new();
     for level in 0..meta.levels {
         let part_name = format!("mip{level}");
         let Some(part) = target.parts.iter().find(|part| part.name == part_name) else { continue };
         let size = u64::from((meta.size >> level).max(1));
         let bytes: &[u8] = revision.bytes(part);
-        check_length(name, &part_name, bytes, 6 * size * size * meta.format.bytes())?;
-        levels.push((level, bytes));
+        let texels = match meta.format.packed() {
+            Some(format) => Cow::Owned(unpack(format, size as usize, bytes).ok_or_else(|| {
+                Diagnostic::error(format!(
+                    "part `{part_name}` of `{name}` has {} bytes, too few",
+                    bytes.len()
+                ))
+            })?),
+            None => {
+                check_length(name, &part_name, bytes, 6 * size * size * meta.format.bytes())?;
+                Cow::Borrowed(bytes)
+            }
+        };
+        levels.push((level, texels));
     }
     if levels.is_empty() {
         return Err(Diagnostic::error(format!("cube `{name}` has no level")));
     }
     Ok(levels)
+}
+
+/// Packed texels of six faces as binary16, alpha 1; `None` if the bytes are not that many.
+fn unpack(format: ktx2::Format, size: usize, bytes: &[u8]) -> Option<Vec<u8>> {
+    let values = format.decode_image(size, size, bytes).filter(|values| values.len() == 18 * size * size)?;
+    let texel =
+        |rgb: &[f32; 3]| [rgb[0], rgb[1], rgb[2], 1.0].map(|value| f16::from_f32(value).to_le_bytes());
+    Some(values.as_chunks().0.iter().flat_map(texel).flatten().collect())
 }
 
 fn check_length(name: &str, part: &str, bytes: &[u8], expected: u64) -> Result<(), Diagnostic> {
@@ -205,7 +225,7 @@ fn filterable(gpu: &Gpu, format: TexelFormat) -> TexelFormat {
 }
 
 /// Smallest power of two that brings every float of the levels under binary16's largest value.
-fn overflow_log2(levels: &[(u32, &[u8])]) -> i32 {
+fn overflow_log2(levels: &[(u32, Cow<[u8]>)]) -> i32 {
     let values = levels.iter().flat_map(|(_, bytes)| floats(bytes));
     let largest =
         values.filter(|value| value.is_finite()).fold(0.0_f32, |largest, value| largest.max(value.abs()));

@@ -62,6 +62,10 @@ fn details(old: &ManifestTarget, new: &ManifestTarget) -> Vec<String> {
     compare("", &as_json(old), &as_json(new), &mut details);
     // The target's digest follows from the rest and says nothing.
     details.retain(|detail| !detail.starts_with("sha256: "));
+    // What was asked for comes before what was found out.
+    details.sort_by_key(|detail| {
+        ["facts.details", "facts.measured"].iter().any(|found| detail.starts_with(found))
+    });
     let surplus = details.len().saturating_sub(DETAILS_MAX);
     details.truncate(DETAILS_MAX);
     if surplus > 0 {

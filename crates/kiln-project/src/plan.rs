@@ -52,13 +52,8 @@ pub enum PartSpec {
     },
     /// The outputs `levels/mip0`, `levels/mip1` … of an action, however many there are.
     Levels(ActionId),
-    /// No content: what an action found out about the target, `facts.OF` of what it said, as the target's `measured`.
-    Facts {
-        /// Which action.
-        action: ActionId,
-        /// Which of its facts.
-        of: String,
-    },
+    /// No content: what an action found out about the target, its `facts`, as the target's `measured`.
+    Facts(ActionId),
 }
 
 impl PartSpec {
@@ -70,9 +65,7 @@ impl PartSpec {
     /// The action it comes from.
     pub fn action(&self) -> ActionId {
         match self {
-            PartSpec::One { action, .. } | PartSpec::Levels(action) | PartSpec::Facts { action, .. } => {
-                *action
-            }
+            PartSpec::One { action, .. } | PartSpec::Levels(action) | PartSpec::Facts(action) => *action,
         }
     }
 
@@ -86,7 +79,7 @@ impl PartSpec {
         };
         match self {
             PartSpec::One { output, part, .. } => Some(vec![named(part, outcome.output(output)?)]),
-            PartSpec::Facts { .. } => outcome.succeeded().then(Vec::new),
+            PartSpec::Facts(_) => outcome.succeeded().then(Vec::new),
             PartSpec::Levels(_) => {
                 let outputs = outcome.record.as_ref()?.result.outputs.iter();
                 let levels =
@@ -283,13 +276,13 @@ fn resolve_target(spec: &TargetSpec, report: &RunReport) -> Option<Target> {
 /// the facts of the plan, which win: an action may serve two targets.
 fn gather_meta(spec: &TargetSpec, report: &RunReport) -> Value {
     let mut meta = Map::new();
-    let is_content = |part: &&PartSpec| !matches!(part, PartSpec::Facts { .. });
+    let is_content = |part: &&PartSpec| !matches!(part, PartSpec::Facts(_));
     let mut actions: Vec<ActionId> = spec.parts.iter().filter(is_content).map(PartSpec::action).collect();
     actions.dedup();
     for part in &spec.parts {
-        if let PartSpec::Facts { action, of } = part
+        if let PartSpec::Facts(action) = part
             && let Some(record) = &report.outcome(*action).record
-            && let Some(facts) = record.result.meta.get("facts").and_then(|facts| facts.get(of))
+            && let Some(facts) = record.result.meta.get("facts")
         {
             meta.insert("measured".to_owned(), facts.clone());
         }

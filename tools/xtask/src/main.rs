@@ -23,8 +23,8 @@ const HELP: &str = "\
 cargo xtask test [--no-install]   install what tests need where that is allowed, then run all tests, clippy, fmt and docs
 cargo xtask bench [EDITS]         save-to-frame of shader and HDR edits, no-op bake, bake of one panorama
 cargo xtask bench cache           no-op bakes, planning, overhead and hashing on generated projects of up to 10 000 files
-cargo xtask bench bake […]        error and cost of prefiltered maps beside a sampled estimator; accuracy, time, sampled: one part
-                                  alone; --huge: memory of a 16384×8192 panorama; panoramas from $KILN_CORPUS
+cargo xtask bench bake […]        error and cost of prefiltered maps beside a sampled estimator; accuracy, sampled, time, scaling:
+                                  one part alone; --huge: memory of a 16384×8192 panorama; panoramas from $KILN_CORPUS
 cargo xtask faults [COUNT]        kill COUNT processes at random moments and flip COUNT bits (default 1000)
 cargo xtask fuzz [COUNT] [SEED]   decode COUNT damaged copies of each image file of the tests (default 100000)
 cargo xtask corpus [OUT]          bake and render the files of $KILN_CORPUS into OUT (default target/corpus)

@@ -116,13 +116,13 @@ impl Reference {
         for (index, (texel, exact)) in self.texels().zip(&self.exact).enumerate() {
             let (x, y) = (texel % self.face_size, texel / self.face_size % self.face_size);
             let solid_angle_sr = solid_angles.at(x, y);
-            let value = value(texel);
+            let values = value(texel);
             let sum = &mut sums[usize::from(index >= self.special.len())];
             sum[1] += solid_angle_sr;
-            for channel in 0..3 {
-                let error = value[channel] - exact[channel];
+            for ((value, exact), mean) in values.iter().zip(exact).zip(self.mean) {
+                let error = value - exact;
                 sum[0] += solid_angle_sr * error * error;
-                let local = exact[channel].abs() + 0.01 * self.mean[channel].abs();
+                let local = exact.abs() + 0.01 * mean.abs();
                 let relative = if error == 0.0 { 0.0 } else { error.abs() / local };
                 // NaN is worse than anything.
                 if relative > found.largest || relative.is_nan() {

@@ -1,5 +1,8 @@
 //! CPU and wall time, and what the machine was doing meanwhile.
 
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::fs::DirEntry;
 use std::time::Instant;
 
 /// What a piece of work took, in seconds.
@@ -32,12 +35,18 @@ impl std::fmt::Display for Times {
 
 /// CPU seconds of all threads of this process that live: rayon's workers do.
 pub(crate) fn cpu_s() -> f64 {
+    threads_cpu_s().values().sum()
+}
+
+/// CPU seconds of each thread, by its number.
+pub(crate) fn threads_cpu_s() -> BTreeMap<OsString, f64> {
     let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
-    let of_task = |task: std::fs::DirEntry| {
+    let of_task = |task: DirEntry| {
         let text = std::fs::read_to_string(task.path().join("schedstat")).unwrap_or_default();
-        text.split(' ').next().and_then(|ns| ns.parse::<f64>().ok()).unwrap_or(0.0)
+        let ns = text.split(' ').next().and_then(|ns| ns.parse::<f64>().ok()).unwrap_or(0.0);
+        (task.file_name(), ns * 1e-9)
     };
-    tasks.map(of_task).sum::<f64>() * 1e-9
+    tasks.map(of_task).collect()
 }
 
 /// Runs `work` once.

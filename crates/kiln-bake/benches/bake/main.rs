@@ -1,7 +1,7 @@
 //! `cargo xtask bench bake`: what a bake costs and how exact it is, beside a plain sampled estimator.
 //!
 //! ```text
-//! … [accuracy] [time] [sampled] [--huge] [--only NAME]
+//! … [accuracy] [sampled] [time] [scaling] [--huge] [--only NAME]
 //! ```
 //!
 //! Without a section's name all run. `--huge` measures the memory of a 16384×8192 panorama too, in a process of its own.
@@ -47,7 +47,7 @@ fn main() -> ExitCode {
     }
     let only = arguments.iter().skip_while(|argument| *argument != "--only").nth(1);
     let only = only.map_or("", String::as_str);
-    let sections = ["accuracy", "time", "sampled"];
+    let sections = ["accuracy", "sampled", "time", "scaling"];
     let is_all = !sections.iter().any(|section| has(section)) && !has("--huge");
     let mut verdict = Verdict::default();
     println!("{}", clock::machine());
@@ -59,6 +59,9 @@ fn main() -> ExitCode {
     }
     if is_all || has("time") {
         time::run(&mut verdict);
+    }
+    if is_all || has("scaling") {
+        time::scaling(&mut verdict);
     }
     if has("--huge") {
         huge::run(&mut verdict);

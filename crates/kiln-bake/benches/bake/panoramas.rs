@@ -80,9 +80,14 @@ fn lamps(width: usize) -> Panorama {
 /// The sun's diameter, in radians.
 const SUN_DIAMETER: f64 = 0.53 * PI / 180.0;
 
-/// A sun of 0.53° at a place of no special position, at a pole and on the wrap column; radiance 10⁵ and 10⁷ over 1 and 0.
+/// A sun of 0.53° at a place of no special position, at a pole, beside it and on the wrap column; radiance 10⁵ and 10⁷ over 1 and 0.
 pub(crate) fn suns(width: usize, only: &str) -> Vec<Named> {
-    let places = [("sun", [1.137, 2.071]), ("sun at the pole", [0.0, 0.0]), ("sun on the wrap", [1.3, 0.0])];
+    let places = [
+        ("sun", [1.137, 2.071]),
+        ("sun at the pole", [0.0, 0.0]),
+        ("sun beside the pole", [0.011, 0.7]),
+        ("sun on the wrap", [1.3, 0.0]),
+    ];
     let mut found = Vec::new();
     for (place, centre) in places {
         for radiance in [1e5, 1e7] {

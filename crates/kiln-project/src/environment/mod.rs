@@ -7,7 +7,7 @@ mod source;
 use std::sync::Arc;
 
 use kiln_bake::{
-    Accuracy, Analysis, AnalysisRequest, BakeError, Bulk, Cancel, Cancelled, EncodedLevel, Prefiltered,
+    Accuracy, Analysis, AnalysisRequest, BakeError, Bulk, Cancel, Cancelled, EncodedLevel, Lobe, Prefiltered,
 };
 use kiln_build::{
     Action, ActionId, ActionOutput, Command, Engine, Error, Input, Inputs, MemoryNeed, little_memory,
@@ -20,6 +20,7 @@ use crate::blob::{decode_environment, environment_size};
 use crate::env_config::{EnvConfig, Range, format_name};
 use crate::plan::{PartSpec, Planner, no_content, rank, unreadable};
 use encode::Encode;
+use measure::Subject;
 use source::Report;
 
 const SH_CONVENTION: &str = "value(direction) = sum over l, m of c[l(l+1)+m] Y_lm(direction); real orthonormal basis \
@@ -71,13 +72,23 @@ pub(crate) fn plan_environment(planner: &mut Planner, engine: &Engine, name: &st
     let mirror = PartSpec::One { action: skybox, output: MIRROR.to_owned(), part: "mip0".to_owned() };
     let specular = chain(planner, "specular", LobeKind::Ggx);
     let sheen = if env.has_sheen { chain(planner, "sheen", LobeKind::Charlie) } else { Vec::new() };
-    let measure = planner.graph.add(steps.measure(decode, irradiance, &specular, &sheen));
-    let with_measure = |parts: Vec<PartSpec>, map: &str| {
-        let facts = PartSpec::Facts { action: measure, of: map.to_owned() };
-        parts.into_iter().chain([facts]).collect()
+    // What measures a map, and the map's target knows it too.
+    let mut accuracy = Vec::new();
+    let mut measured = |planner: &mut Planner, map: &'static str, levels: &[ActionId], lobe: LobeOf| {
+        let first = if map == "irradiance" { 0 } else { count - levels.len() };
+        let subject = |(index, &level): (usize, &ActionId)| {
+            let face_size =
+                if map == "irradiance" { env.irradiance_size } else { env.face_size(first + index) };
+            Subject { level, lobe: lobe(env.roughness(first + index)), face_size }
+        };
+        let subjects = levels.iter().enumerate().map(subject).collect();
+        let action = planner.graph.add(steps.measure(map, decode, subjects));
+        accuracy.push(PartSpec::One { action, output: "json".to_owned(), part: map.to_owned() });
+        PartSpec::Facts(action)
     };
     let meta = json!({"size": env.irradiance_size, "levels": 1});
-    planner.target(target("irradiance"), "cube", meta, with_measure(vec![part(irradiance, 0)], "irradiance"));
+    let facts = measured(planner, "irradiance", &[irradiance], |_| Lobe::Lambert);
+    planner.target(target("irradiance"), "cube", meta, vec![part(irradiance, 0), facts]);
     let law = env.law.formula();
     let roughness: Vec<f64> = (0..count).map(|level| env.roughness(level)).collect();
     let meta = json!({"size": env.size, "levels": count, "law": law, "roughness": roughness});
@@ -87,17 +98,35 @@ pub(crate) fn plan_environment(planner: &mut Planner, engine: &Engine, name: &st
         let mirror = (first > 0).then(|| mirror.clone());
         mirror.into_iter().chain(levels).collect()
     };
-    let parts = with_measure(chain_parts(&specular), "specular");
+    let mut parts = chain_parts(&specular);
+    if !specular.is_empty() {
+        parts.push(measured(planner, "specular", &specular, LobeKind::Ggx.of()));
+    }
     planner.target(target("specular"), "cube", meta.clone(), parts);
     if env.has_sheen {
-        planner.target(target("sheen"), "cube", meta, with_measure(chain_parts(&sheen), "sheen"));
+        let mut parts = chain_parts(&sheen);
+        parts.push(measured(planner, "sheen", &sheen, LobeKind::Charlie.of()));
+        planner.target(target("sheen"), "cube", meta, parts);
     }
+    planner.target(target("accuracy"), "accuracy", json!({}), accuracy);
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum LobeKind {
     Ggx,
     Charlie,
+}
+
+/// A lobe by perceptual roughness.
+type LobeOf = fn(f64) -> Lobe;
+
+impl LobeKind {
+    fn of(self) -> LobeOf {
+        match self {
+            LobeKind::Ggx => |roughness| Lobe::Ggx { alpha: roughness * roughness },
+            LobeKind::Charlie => |roughness| Lobe::Charlie { alpha: sheen_alpha(roughness) },
+        }
+    }
 }
 
 struct Steps<'a> {
