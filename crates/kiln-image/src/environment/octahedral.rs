@@ -4,6 +4,7 @@
 //! Representations for Independent Unit Vectors" (there with +Z up; here +Y).
 
 use crate::{Bulk, Cancel, Cancelled, DecodeError, Image, Limits, Panorama, decode::check_size};
+use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// Unit direction at (`u`, `v`) in [0, 1]² of an octahedral map, from its top left; +Y in the centre, +X at the right, −Z at
@@ -27,7 +28,7 @@ pub fn octahedral_uv(direction: [f64; 3]) -> [f64; 2] {
 
 /// Mirrors a triangle at the diamond's edge; its own inverse.
 fn fold(a: f64, b: f64) -> (f64, f64) {
-    (libm::copysign(1.0 - b.abs(), a), libm::copysign(1.0 - a.abs(), b))
+    ((1.0 - b.abs()).copysign(a), (1.0 - a.abs()).copysign(b))
 }
 
 /// Samples along each side of a panorama texel, and where light and dark meet in it: the share of a lamp's texels that falls
@@ -49,41 +50,59 @@ pub(super) fn resample(map: &Image, limits: &Limits, cancel: Cancel) -> Result<P
     let (width, height) = (2 * size, size);
     check_size("octahedral map as panorama", width, height, limits)?;
     let contrast_max = LAMP_SHARE * sum(map, cancel)?;
-    let columns: Vec<[f64; 2]> = (0..width).flat_map(|column| longitudes(column, width, SAMPLES)).collect();
-    let mut rgb = Bulk::new(Vec::with_capacity(width * height * 3));
-    let mut ranges: Bulk<Vec<Range>> = Bulk::new(Vec::with_capacity(width * height));
-    for row in 0..height {
+    let columns: Vec<Longitude> = (0..width).flat_map(|column| longitudes(column, width, SAMPLES)).collect();
+    let mut rgb = Bulk::new(vec![0.0_f32; width * height * 3]);
+    let mut ranges: Bulk<Vec<Range>> = Bulk::new(vec![EMPTY; width * height]);
+    let lines = rgb.par_chunks_mut(3 * width).zip(ranges.par_chunks_mut(width)).enumerate();
+    lines.try_for_each(|(row, (line, ranges))| {
         let rings = rings(row, height, SAMPLES);
-        for longitudes in columns.chunks_exact(SAMPLES) {
+        let texels = line.as_chunks_mut::<3>().0.iter_mut().zip(ranges);
+        for ((texel, range), longitudes) in texels.zip(columns.chunks_exact(SAMPLES)) {
             // 16 samples a texel: a row of 16384 would be milliseconds.
             cancel.check()?;
-            let texel = sample(map, &rings, longitudes);
-            rgb.extend(texel.mean.map(|value| value as f32));
-            ranges.push(texel.range);
+            let sampled = sample(map, &rings, longitudes);
+            *texel = sampled.mean.map(|value| value as f32);
+            *range = sampled.range;
         }
-    }
-    for row in 0..height {
+        Ok::<(), Cancelled>(())
+    })?;
+    // A row can be at a lamp only where it and its neighbours differ so much in all.
+    let row_ranges: Vec<Range> = ranges.chunks(width).map(|row| row.iter().fold(EMPTY, join)).collect();
+    rgb.par_chunks_mut(3 * width).enumerate().try_for_each(|(row, line)| {
+        if contrast(row_ranges[rows_around(row, height)].iter().fold(EMPTY, join)) <= contrast_max {
+            return Ok::<(), Cancelled>(());
+        }
         let rings = rings(row, height, SAMPLES_AT_LAMPS);
-        for column in 0..width {
+        for (column, texel) in line.as_chunks_mut::<3>().0.iter_mut().enumerate() {
             cancel.check()?;
             if contrast_around(&ranges, width, row, column) > contrast_max {
-                let longitudes: Vec<[f64; 2]> = longitudes(column, width, SAMPLES_AT_LAMPS).collect();
-                let start = (row * width + column) * 3;
-                let values = rgb[start..start + 3].iter_mut().zip(sample(map, &rings, &longitudes).mean);
-                values.for_each(|(value, mean)| *value = mean as f32);
+                let longitudes: Vec<Longitude> = longitudes(column, width, SAMPLES_AT_LAMPS).collect();
+                *texel = sample(map, &rings, &longitudes).mean.map(|value| value as f32);
             }
         }
-    }
+        Ok(())
+    })?;
     Ok(Panorama::new(Image::new(width, height, rgb.into_inner())?)?)
 }
 
 /// The contrast in a texel and its eight neighbours: a lamp's corner may reach in between the samples.
 fn contrast_around(ranges: &[Range], width: usize, row: usize, column: usize) -> f64 {
-    let rows = row.saturating_sub(1)..(row + 2).min(ranges.len() / width);
-    let columns = [column + width - 1, column, column + 1].map(|column| column % width);
+    let columns = [if column == 0 { width - 1 } else { column - 1 }, column, (column + 1) % width];
+    let rows = rows_around(row, ranges.len() / width);
     let around = rows.flat_map(|row| columns.map(|column| &ranges[row * width + column]));
-    let [lowest, highest] =
-        around.fold(EMPTY, |[lowest, highest], range| [lowest.min(range[0]), highest.max(range[1])]);
+    contrast(around.fold(EMPTY, join))
+}
+
+/// A row and its neighbours.
+fn rows_around(row: usize, height: usize) -> std::ops::Range<usize> {
+    row.saturating_sub(1)..(row + 2).min(height)
+}
+
+fn join([lowest, highest]: Range, range: &Range) -> Range {
+    [lowest.min(range[0]), highest.max(range[1])]
+}
+
+fn contrast([lowest, highest]: Range) -> f64 {
     f64::from(highest) - f64::from(lowest)
 }
 
@@ -98,11 +117,15 @@ fn sum(map: &Image, cancel: Cancel) -> Result<f64, Cancelled> {
     Ok(sum)
 }
 
-/// Sine and cosine of even steps in longitude over a column.
-fn longitudes(column: usize, width: usize, samples: usize) -> impl Iterator<Item = [f64; 2]> {
+/// Sine and cosine of a longitude, and the sum of their magnitudes.
+type Longitude = [f64; 3];
+
+/// Even steps in longitude over a column.
+fn longitudes(column: usize, width: usize, samples: usize) -> impl Iterator<Item = Longitude> {
     (0..samples).map(move |sample| {
         let u = ((column * samples + sample) as f64 + 0.5) / (width * samples) as f64;
-        libm::sincos(2.0 * PI * (u - 0.5)).into()
+        let (sin, cos) = libm::sincos(2.0 * PI * (u - 0.5));
+        [sin, cos, sin.abs() + cos.abs()]
     })
 }
 
@@ -127,17 +150,24 @@ struct Sampled {
     range: Range,
 }
 
-fn sample(map: &Image, rings: &[[f64; 2]], longitudes: &[[f64; 2]]) -> Sampled {
-    let size = map.width;
-    let index = |position: f64| ((position * size as f64) as usize).min(size - 1);
+/// The map's texels at samples; as [`octahedral_uv`], in texels from the map's centre.
+fn sample(map: &Image, rings: &[[f64; 2]], longitudes: &[Longitude]) -> Sampled {
+    let (half, last) = (0.5 * map.width as f64, map.width as i64 - 1);
+    let index = |position: f64| ((position + half) as i64).clamp(0, last) as usize;
     let (mut sum, mut range) = ([0.0; 3], EMPTY);
     for &[y, radius] in rings {
-        for &[sin, cos] in longitudes {
-            let [u, v] = octahedral_uv([radius * sin, y, -radius * cos]);
-            let texel = map.texel(index(u), index(v)).map(f64::from);
-            sum.iter_mut().zip(texel).for_each(|(sum, value)| *sum += value);
-            let light = (texel[0] + texel[1] + texel[2]) as f32;
-            range = [range[0].min(light), range[1].max(light)];
+        for &[sin, cos, reach] in longitudes {
+            let scale = half * radius / (y.abs() + radius * reach);
+            let (a, b) = (scale * sin, -scale * cos);
+            let (a, b) =
+                if y >= 0.0 { (a, b) } else { ((half - b.abs()).copysign(a), (half - a.abs()).copysign(b)) };
+            let start = 3 * (index(b) * map.width + index(a));
+            let texel = &map.rgb[start..start + 3];
+            for (sum, &value) in sum.iter_mut().zip(texel) {
+                *sum += f64::from(value);
+            }
+            let light = texel[0] + texel[1] + texel[2];
+            range = join(range, &[light, light]);
         }
     }
     let count = (rings.len() * longitudes.len()) as f64;
