@@ -161,12 +161,17 @@ impl<K: ZonalKernel> BrightSet<K> {
         sum
     }
 
-    /// `None` where the texel lies below all horizons.
+    /// `None` where the texel lies below all horizons, or where the kernel is nothing.
     #[inline(always)]
     fn integrate(&self, texel: &RuledTexel, axes: &[Lanes; 3]) -> Option<Lanes> {
         let one_minus_x = one_minus_cosines(texel.centre, axes);
         let nearest = one_minus_x.iter().fold(f64::INFINITY, |a: f64, &b| a.min(b));
         if is_below_horizon(2.0 * nearest, texel.size) {
+            return None;
+        }
+        let farthest = one_minus_x.iter().fold(0.0, |a: f64, &b| a.max(b));
+        let far = (2.0 * farthest).sqrt() + texel.size;
+        if self.kernel.is_negligible(far * far) {
             return None;
         }
         // Along one side the kernel is seen from as near as half the other side closer.

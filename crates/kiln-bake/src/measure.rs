@@ -320,7 +320,9 @@ impl<'a, K: ZonalKernel> View<'a, K> {
             let one_minus_x = (1.0 - cos * self.axis[1]) - sin * self.across[0][block + lane];
             let is_cut =
                 is_on_horizon(2.0 * one_minus_x, *size) && source.planes[3][start + lane] > self.bright;
-            self.kernel.scale2((2.0 * one_minus_x).max(0.0)) < limit || is_cut
+            let chord2 = (2.0 * one_minus_x).max(0.0);
+            let is_near = self.kernel.scale2(chord2) < limit;
+            (is_near && !self.kernel.is_negligible((chord2.sqrt() + size) * (chord2.sqrt() + size))) || is_cut
         });
         for lane in (0..LANES).filter(|&lane| is_near[lane] && block + lane < self.source.width) {
             let index = row * self.source.width + block + lane;

@@ -117,7 +117,8 @@ impl Patch {
         }
         // The nearest point of the patch is where the kernel varies fastest.
         let chord = (distance2.sqrt() - 0.75 * size).max(0.0);
-        let is_smooth = size * size <= size_max * size_max * profile.scale2(chord * chord);
+        let is_smooth = size * size <= size_max * size_max * profile.scale2(chord * chord)
+            || profile.is_negligible((distance2.sqrt() + size) * (distance2.sqrt() + size));
         if !is_smooth && size >= 1e-9 {
             return self.split().iter().map(|half| half.integrate(profile, axis, size_max, count)).sum();
         }

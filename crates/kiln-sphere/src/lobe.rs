@@ -53,6 +53,12 @@ pub trait ZonalKernel: Copy + Send + Sync {
     /// Squared angle over which K varies, seen at a squared chord from the axis.
     fn scale2(&self, chord2: f64) -> f64;
 
+    /// Whether K up to that squared chord is no part of any sum: how it varies there does not matter.
+    #[inline(always)]
+    fn is_negligible(&self, _chord2: f64) -> bool {
+        false
+    }
+
     /// K at 1 − cos θ.
     #[inline(always)]
     fn at(&self, one_minus_x: f64) -> f64 {
@@ -84,15 +90,15 @@ impl GgxProfile {
     }
 }
 
-/// ln 1e-9.
-const NEGLIGIBLE_LN: f64 = -20.723_265_836_946_41;
+/// ln 1e-18: what a sun of 1e7 makes of it no sum can notice.
+const NEGLIGIBLE_LN: f64 = -41.446_531_673_892_82;
 
 /// (2 + 1/α) sin(θ_h)^(1/α) / 2π in logarithms.
 #[derive(Clone, Copy, Debug)]
 pub struct CharlieProfile {
     alpha: f64,
     ln_scale: f64,
-    /// Squared chord up to which K is below 1e-9 of what it is at the horizon.
+    /// Squared chord up to which K is below 1e-18 of what it is at the horizon.
     negligible_chord2: f64,
 }
 
@@ -126,10 +132,15 @@ impl ZonalKernel for CharlieProfile {
         if sin2 > 0.0 { libm::exp(self.ln_scale + 0.5 / self.alpha * libm::log(sin2)) } else { 0.0 }
     }
 
-    /// Twice the e-folding length of a power of the chord; anything where it has no weight.
+    /// Twice the e-folding length of a power of the chord; near the axis, where it has no weight, no less than 0.02.
     #[inline(always)]
     fn scale2(&self, chord2: f64) -> f64 {
-        if chord2 < self.negligible_chord2 { 4.0 } else { 4.0 * self.alpha * self.alpha * (chord2 + 4e-4) }
+        4.0 * self.alpha * self.alpha * (chord2 + 4e-4)
+    }
+
+    #[inline(always)]
+    fn is_negligible(&self, chord2: f64) -> bool {
+        chord2 < self.negligible_chord2
     }
 }
 
@@ -147,6 +158,14 @@ impl ZonalKernel for Profile {
         match self {
             Profile::Ggx(kernel) => kernel.scale2(chord2),
             Profile::Charlie(kernel) => kernel.scale2(chord2),
+        }
+    }
+
+    #[inline]
+    fn is_negligible(&self, chord2: f64) -> bool {
+        match self {
+            Profile::Ggx(kernel) => kernel.is_negligible(chord2),
+            Profile::Charlie(kernel) => kernel.is_negligible(chord2),
         }
     }
 }

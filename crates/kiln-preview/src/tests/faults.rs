@@ -180,7 +180,7 @@ fn hostile_cube_descriptions_are_refused_before_anything_is_allocated() {
             "`env/sky/skybox` has size",
         );
     }
-    let meta = json!({ "size": 4, "levels": 3, "format": "rgb9e5" });
+    let meta = json!({ "size": 4, "levels": 3, "format": "rgb565" });
     check_error(
         |build| {
             build.target("env/sky/skybox", "cube", meta, &[]);

@@ -117,6 +117,25 @@ fn power_of_two_scale_of_a_cube_is_undone() {
 }
 
 #[test]
+fn packed_texels_are_shown_as_what_they_stand_for() {
+    let Some(gpu) = gpu() else { return };
+    let mut viewer = HeadlessViewer::new(gpu, [8, 8]);
+    let mut build = Build::new();
+    build.shaders(&[&[]]).env("sky", [[0.25, 0.5, 0.125]; 6]);
+    viewer.apply(&build.revision());
+    let plain = *viewer.render().expect("the device reads back").get_pixel(4, 4);
+    let texel = kiln_image::texel::rgb9e5::encode([0.25, 0.5, 0.125]);
+    let other = kiln_image::texel::rgb9e5::encode([0.25, 0.125, 0.5]);
+    for (texel, is_same) in [(texel, true), (other, false)] {
+        let meta = json!({ "size": 4, "levels": 1, "format": "rgb9e5" });
+        let texels = texel.repeat(6 * 4 * 4);
+        viewer.apply(&build.target("env/sky/skybox", "cube", meta, &[("mip0", texels)]).revision());
+        let shown = *viewer.render().expect("the device reads back").get_pixel(4, 4);
+        assert_eq!(shown == plain, is_same, "{shown:?} for {plain:?}");
+    }
+}
+
+#[test]
 fn exposure_of_one_stop_doubles_radiance() {
     let Some(gpu) = gpu() else { return };
     let mut viewer = HeadlessViewer::new(gpu, [8, 8]);

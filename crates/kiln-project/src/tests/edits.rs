@@ -14,12 +14,14 @@ fn each_edit_runs_exactly_what_it_affects() {
     place.edit("quad.gltf", "\"name\":\"plain\"", "\"name\":\"rough\"");
     assert_eq!(ran(&place.build()), ["pack scene/quad"]);
     place.edit("kiln.toml", "irradiance_size = 4", "irradiance_size = 2");
-    assert_eq!(ran(&place.build()), ["irradiance env/room"]);
+    assert_eq!(ran(&place.build()), ["irradiance env/room", "measure env/room/irradiance"]);
     place.write("room.hdr", panorama(2.0));
     let expected = [
         "analyse env/room",
         "decode env/room",
         "irradiance env/room",
+        "measure env/room/irradiance",
+        "measure env/room/specular",
         "prefilter env/room/specular mip 1",
         "sh env/room",
         "skybox env/room",
@@ -56,7 +58,7 @@ fn reverted_edit_runs_nothing() {
     let before = place.build().targets;
     let good = fs::read(place.folder.path().join("room.hdr")).unwrap();
     place.write("room.hdr", panorama(3.0));
-    assert_eq!(ran(&place.build()).len(), 6);
+    assert_eq!(ran(&place.build()).len(), 8);
     place.write("room.hdr", good);
     let built = place.build();
     assert!(ran(&built).is_empty());
