@@ -186,6 +186,12 @@ fn texel_policies_and_limits_say_what_they_did() {
     assert_eq!(code, Some(0), "{kept}");
     let is_finite = |map: &str| desk.cube(map).rgb.iter().all(|value| value.is_finite());
     assert!(!is_finite("maps/bad/skybox.ktx2") && is_finite("maps/bad/irradiance.ktx2"), "{kept}");
+    assert!(is_finite("maps/bad/specular.ktx2"), "the mirror level is no place for NaN");
+    let (code, both) = said(&["--texels", "keep", "--sun", "extract"]);
+    assert_eq!(code, Some(1), "{both}");
+    let report = desk.bake(&["bad.exr", "--out", "maps", "--size", "8"]);
+    let texels = &report["environments"]["bad"]["maps"]["skybox"]["source"]["texels"];
+    assert_eq!((&texels["nan"], &texels["negative"]), (&Value::from(1), &Value::from(1)), "{texels}");
 }
 
 #[test]
@@ -208,6 +214,94 @@ fn sun_leaves_as_a_light_and_the_flux_adds_up() {
         let flux = |part: &str| facts["flux"][part][channel].as_f64().unwrap();
         let error = (flux("light") + flux("remaining")) / flux("original") - 1.0;
         assert!(error.abs() <= 1e-12, "channel {channel}: {error}");
+    }
+}
+
+/// Σ L dω of a panorama file's first channel.
+fn flux(path: &Path) -> f64 {
+    let bytes = std::fs::read(path).unwrap();
+    let image = kiln_image::decode(&bytes, &kiln_image::Limits::default(), Cancel::NEVER).unwrap().image;
+    let polar = |row: usize| (std::f64::consts::PI * row as f64 / image.height as f64).cos();
+    let row = |row: usize| image.row(row).iter().step_by(3).map(|value| f64::from(*value)).sum::<f64>();
+    (0..image.height).map(|y| row(y) * (polar(y) - polar(y + 1))).sum::<f64>() / image.width as f64
+}
+
+#[test]
+fn engines_get_the_sun_and_all_of_the_light() {
+    let desk = Desk::new();
+    let (width, height) = (256, 128);
+    let texel = |index: usize| if index == 20 * width + 3 { [9e4; 3] } else { [0.5, 1.0, 2.0] };
+    let image = Image::new(width, height, (0..width * height).flat_map(texel).collect()).unwrap();
+    let source = desk.write("day.exr", &exr(&image));
+    desk.bake(&["day.exr", "--out", "three", "--for", "three", "--size", "32"]);
+    let error = flux(&desk.path("three/day/day.exr")) / flux(&source) - 1.0;
+    assert!(error.abs() <= 1e-5, "the panorama for three.js lost {error} of the flux");
+    let output = desk.env(&["day.exr", "--out", "bevy", "--for", "bevy", "--size", "32", "--sun", "extract"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let sun = std::fs::read(desk.path("bevy/day/day_sun.json")).unwrap();
+    let sun: Value = serde_json::from_slice(&sun).unwrap();
+    assert!(sun["light"]["irradiance"][0].as_f64().unwrap() > 1.0, "{sun:#}");
+    // A peak above the format's range is scaled, and said.
+    let output = desk.env(&["day.exr", "--out", "bevy", "--for", "bevy", "--size", "256"]);
+    assert!(text(&output.stderr).contains("stored divided by 2"), "{}", text(&output.stderr));
+}
+
+#[test]
+fn another_engine_s_files_do_not_stay_behind() {
+    let desk = Desk::new();
+    desk.write("sky.hdr", &panorama(32));
+    desk.bake(&["sky.hdr", "--out", "maps", "--for", "three", "--size", "16"]);
+    desk.write("maps/sky/mine.txt", b"not Kiln's");
+    desk.bake(&["sky.hdr", "--out", "maps", "--for", "filament", "--size", "16"]);
+    assert!(!desk.path("maps/sky/sky.hdr").exists() && desk.path("maps/sky/sky_ibl.ktx").exists());
+    assert!(desk.path("maps/sky/mine.txt").exists());
+}
+
+#[test]
+fn skybox_pictures_are_read_back_as_the_same_cube() {
+    let desk = Desk::new();
+    let cube = cube(16);
+    desk.write("cube.exr", &exr_write::encode_cube(&cube, Cancel::NEVER).unwrap());
+    for (picture, file) in [("cross.exr", "skybox_cross.exr"), ("strip-tall.exr", "skybox_strip-tall.exr")] {
+        let exact = ["--size", "16", "--format", "rgba32f", "--out", "maps"];
+        desk.bake(&[&["cube.exr", "--picture", picture], &exact[..]].concat());
+        let written = format!("maps/cube/{file}");
+        desk.bake(&[&[written.as_str(), "--name", "again"], &exact[..]].concat());
+        assert!(desk.cube("maps/again/skybox.ktx2") == cube, "{picture}");
+    }
+    for picture in ["faces.hdr", "octahedral.exr", "equirect.png"] {
+        desk.bake(&["cube.exr", "--picture", picture, "--out", "maps", "--size", "16"]);
+    }
+    assert!(
+        ["px.hdr", "nz.hdr", "octahedral.exr", "equirect.png"]
+            .iter()
+            .all(|name| desk.path(&format!("maps/cube/skybox_{name}")).is_file())
+    );
+}
+
+#[test]
+fn requests_that_make_no_sense_are_refused_before_anything_is_written() {
+    let desk = Desk::new();
+    desk.write("sky.hdr", &panorama(32));
+    for wrong in [
+        &["--skybox-size", "0"][..],
+        &["--skybox-size", "100000"],
+        &["--name", "../evil"],
+        &["--name", ""],
+        &["--max-radiance", "1e-60"],
+        &["--max-radiance", "inf"],
+        &["--irradiance-size", "0"],
+        &["--law", "0,1", "--levels", "5"],
+        &["--for", "bevy", "--law", "eevee"],
+        &["--for", "filament", "--dering"],
+        &["--for", "unity"],
+        &["--picture", "ball.exr"],
+        &["--faces"],
+        &["missing.hdr"],
+    ] {
+        let output = desk.env(&[&["sky.hdr", "--out", "x", "--size", "16"], wrong].concat());
+        assert_eq!(output.status.code(), Some(1), "{wrong:?}: {}", text(&output.stderr));
+        assert!(!desk.path("x").exists() && !desk.path("../evil").exists(), "{wrong:?}");
     }
 }
 

@@ -37,7 +37,7 @@ mod tables;
 #[cfg(test)]
 mod tests;
 
-pub use kiln_brdf::{Masking, SheenVisibility};
+pub use kiln_brdf::{Masking, SheenVisibility, fit_error, fit_karis_mobile, fit_lazarov};
 pub use kiln_sphere::{Bulk, Cancel, Cancelled, Lobe};
 
 pub use analysis::{Analysis, AnalysisRequest, BAND_LIMIT_MAX, BRIGHT_MAX, analyse};

@@ -4,8 +4,7 @@ use crate::conventions::{conventions, with_law};
 use crate::cube_file::{Container, CubeStyle, cube_file, scale_for};
 use crate::{BakedEnvironment, Cancel, ExportError, ExportFile, Preset};
 use kiln_bake::TexelFormat;
-use kiln_image::cube_layout::equirect;
-use kiln_image::{Panorama, exr_write, ktx2};
+use kiln_image::{exr_write, ktx2};
 use serde_json::json;
 
 pub(crate) fn package(
@@ -40,12 +39,12 @@ pub(crate) fn package(
     }
 
     let sky = &environment.skybox[0];
-    let panorama = Panorama::new(equirect(sky, 2 * sky.face_size, cancel)?).expect("twice as wide as high");
+    let panorama = kiln_bake::panorama_of_cube(sky, cancel)?;
     let panorama =
         ExportFile { path: name("panorama.exr"), bytes: exr_write::encode_panorama(&panorama, cancel)? };
     facts.push(json!({
         "path": panorama.path, "holds": "radiance panorama", "format": "OpenEXR, binary32, ZIP, envmap latlong",
-        "centre": "-Z", "resampled": "bilinear from the skybox cube at texel centres, two rows a face texel",
+        "centre": "-Z", "resampled": "area means of the skybox cube, two rows a face texel: flux is kept",
     }));
     let cube = ExportFile { path: name("cube.exr"), bytes: exr_write::encode_cube(sky, cancel)? };
     facts.push(json!({

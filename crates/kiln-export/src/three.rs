@@ -9,15 +9,22 @@
 
 use crate::conventions::conventions;
 use crate::{BakedEnvironment, Cancel, ExportError, ExportFile, Preset, sh};
-use kiln_image::cube_layout::{FACE_STEMS, Mirror, face_image, mirror, resample};
-use kiln_image::{Panorama, exr_write, hdr};
-use kiln_sphere::panorama_direction;
+use kiln_image::cube_layout::{FACE_STEMS, Mirror, face_image, mirror};
+use kiln_image::{Image, Panorama, exr_write, hdr};
 use serde_json::json;
 
-/// Direction that three.js sees at (`u`, `v`) of a panorama, v from the top: Kiln's turned so that the centre is +X.
-fn equirect_direction(u: f64, v: f64) -> [f64; 3] {
-    let [x, y, z] = panorama_direction(u, v);
-    [-z, y, x]
+/// A panorama as three.js wants it: turned so that its centre, which looks along −Z here, looks along +X.
+fn turned(panorama: &Panorama, cancel: Cancel) -> Result<Image, ExportError> {
+    let (width, height) = (panorama.width(), panorama.height());
+    let mut rgb = Vec::with_capacity(width * height * 3);
+    for row in panorama.rgb().chunks_exact(width * 3) {
+        cancel.check()?;
+        // After a quarter of the columns, of three values each.
+        let (left, right) = row.split_at(width / 4 * 3);
+        rgb.extend_from_slice(right);
+        rgb.extend_from_slice(left);
+    }
+    Ok(Image { width, height, rgb })
 }
 
 pub(crate) fn package(
@@ -27,11 +34,10 @@ pub(crate) fn package(
     let name = &environment.name;
     let sky = &environment.skybox[0];
     let height = 2 * sky.face_size;
-    let image = resample(sky, 2 * height, height, equirect_direction, cancel)?;
-    let panorama = Panorama::new(image).expect("twice as wide as high");
+    let panorama = turned(&kiln_bake::panorama_of_cube(sky, cancel)?, cancel)?;
     let mut files = vec![
-        ExportFile { path: format!("{name}.hdr"), bytes: hdr::encode(panorama.image()) },
-        ExportFile { path: format!("{name}.exr"), bytes: exr_write::encode_image(panorama.image(), cancel)? },
+        ExportFile { path: format!("{name}.hdr"), bytes: hdr::encode(&panorama) },
+        ExportFile { path: format!("{name}.exr"), bytes: exr_write::encode_image(&panorama, cancel)? },
     ];
     let mirrored = mirror(sky, Mirror::X);
     for (face, suffix) in FACE_STEMS.into_iter().enumerate() {
@@ -49,7 +55,7 @@ pub(crate) fn package(
     bytes.push(b'\n');
     files.push(ExportFile { path: format!("{name}_lightprobe.json"), bytes });
 
-    let resampled = "bilinear from the skybox cube at texel centres, two rows a face texel";
+    let resampled = "area means of the skybox cube, two rows a face texel: flux is kept";
     let facts = vec![
         json!({
             "path": format!("{name}.hdr"), "holds": "radiance panorama for PMREMGenerator.fromEquirectangular",

@@ -156,13 +156,16 @@ fn address_mode(wrap: Wrap) -> wgpu::AddressMode {
     }
 }
 
+/// A level's number and its texels.
+type Level<'a> = (u32, Cow<'a, [u8]>);
+
 /// The levels a cube target holds, with their bytes checked; levels that nothing needs may be absent.
 fn read_levels<'a>(
     name: &str,
     target: &Target,
     revision: &'a Revision,
     meta: &CubeMeta,
-) -> Result<Vec<(u32, Cow<'a, [u8]>)>, Diagnostic> {
+) -> Result<Vec<Level<'a>>, Diagnostic> {
     let mut levels = Vec::new();
     for level in 0..meta.levels {
         let part_name = format!("mip{level}");
@@ -225,7 +228,7 @@ fn filterable(gpu: &Gpu, format: TexelFormat) -> TexelFormat {
 }
 
 /// Smallest power of two that brings every float of the levels under binary16's largest value.
-fn overflow_log2(levels: &[(u32, Cow<[u8]>)]) -> i32 {
+fn overflow_log2(levels: &[Level]) -> i32 {
     let values = levels.iter().flat_map(|(_, bytes)| floats(bytes));
     let largest =
         values.filter(|value| value.is_finite()).fold(0.0_f32, |largest, value| largest.max(value.abs()));

@@ -136,6 +136,10 @@ pub(crate) fn read_env(section: &mut Section) -> EnvConfig {
     config.radiance_max = section.number("max_radiance", 1e-30..=1e38);
     config.is_sun_extracted =
         section.choice("sun", &[("keep", false), ("extract", true)]).unwrap_or(default.is_sun_extracted);
+    if config.is_sun_extracted && config.texels == TexelPolicy::Keep {
+        let message = "`sun = \"extract\"` needs radiance: `texels` may not be \"keep\"".to_owned();
+        section.fail(message, section.place("sun"), None);
+    }
     if !config.size.is_power_of_two() {
         let message = format!("`size` is {}, which is no power of two", config.size);
         let help =

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use kiln_bake::{Cancel, TexelFormat};
 use kiln_build::{Engine, Error, RunOptions, Target};
+use kiln_diagnostic::Diagnostic;
 use kiln_export::{BakedEnvironment, DfgTable, ExportError, ExportFile, Preset, package_as};
 use kiln_image::Cube;
 use serde_json::Value;
@@ -77,17 +78,51 @@ pub fn export(
         is_without_default_lut: true,
         ..project.clone()
     };
-    let built = build_apart(engine, &project, options)?.ok_or(ExportFailure::Cancelled)?;
+    let mut built = build_apart(engine, &project, options)?.ok_or(ExportFailure::Cancelled)?;
     let mut files = BTreeMap::new();
+    let mut diagnostics = Vec::new();
     for (name, env) in &project.envs {
         let Some(baked) = assemble(engine, &built, name, env, table_size)? else { continue };
         let cancel = Cancel::when(options.cancel);
         let packaged = package_as(preset, &baked, format, cancel);
-        let packaged = packaged.map_err(|error| ExportFailure::Package { env: name.clone(), error })?;
+        let mut packaged = packaged.map_err(|error| ExportFailure::Package { env: name.clone(), error })?;
+        diagnostics.extend(encoding_notes(name, &packaged));
+        if let Some(sun) = built.targets.get(&format!("env/{name}/sun")) {
+            let bytes = content(engine, sun, 0)?.to_vec();
+            packaged.push(ExportFile { path: format!("{name}_sun.json"), bytes });
+        }
         files.insert(name.clone(), packaged);
     }
+    built.diagnostics.extend(diagnostics);
     Ok(Exported { built, files })
 }
+
+/// What an engine's formats cannot hold, and the scale that brings values into their range, as `conventions.json` has them:
+/// never silent.
+fn encoding_notes(env: &str, files: &[ExportFile]) -> Vec<Diagnostic> {
+    let conventions = files.iter().find(|file| file.path == CONVENTIONS_FILE);
+    let facts: Value =
+        conventions.and_then(|file| serde_json::from_slice(&file.bytes).ok()).unwrap_or_default();
+    let mut said = Vec::new();
+    for file in facts["files"].as_array().into_iter().flatten() {
+        let clamped = file["encoding_error"]["clamped_flux"].as_array().into_iter().flatten();
+        let worst = clamped.filter_map(Value::as_f64).fold(0.0, f64::max);
+        if worst > 0.0 {
+            let (path, format) = (&file["path"], &file["format"]);
+            said.push(Diagnostic::warning(format!(
+                "env/{env}: {path}: {format} cannot hold all values: {worst:.2e} of the flux is cut"
+            )));
+        }
+    }
+    if let Some(scale) = facts["multiply_by"].as_f64().filter(|scale| *scale != 1.0) {
+        let message = format!("env/{env}: values are stored divided by {scale}, see conventions.json");
+        said.push(Diagnostic::note(message));
+    }
+    said
+}
+
+/// The file of a set that says how to read the others.
+pub const CONVENTIONS_FILE: &str = "conventions.json";
 
 /// The maps of an environment as values; `None` if one of them could not be made.
 fn assemble(

@@ -10,12 +10,12 @@
 //! Not here: how maps are computed (`kiln-bake`), caching (`kiln-build`), watching (`kiln-daemon`).
 
 pub use build::{Built, HEALING_TRIES_MAX, build, build_apart};
-pub use export::{ExportFailure, Exported, export, wished};
+pub use export::{CONVENTIONS_FILE, ExportFailure, Exported, export, wished};
 // The limits of an environment are those of its recipe.
 pub use check::{Difference, DifferenceKind, differences};
 pub use config::{Project, Role, SceneConfig, ShaderConfig, parse_project};
 pub use env_config::{EnvConfig, FORMATS, Range, format_name};
-pub use kiln_bake::{BAND_LIMIT_MAX, RoughnessLaw, TexelFormat};
+pub use kiln_bake::{BAND_LIMIT_MAX, RoughnessLaw, TexelFormat, panorama_of_cube};
 pub use kiln_export::{ExportFile, Preset};
 pub use kiln_image::{FACE_NAMES, Layout, TexelPolicy};
 pub use lut_config::{LutConfig, TABLES, table_name};

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use kiln_bake::{Masking, Table, TableAxes};
 use kiln_build::{Action, little_memory};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::environment::{cancel, command, ended, success};
 use crate::lut_config::{LutConfig, table_name};
@@ -17,15 +17,29 @@ pub(crate) const DEFAULT: LutConfig =
 /// Roughness from which on a table's stated error counts: what lookups are off by below it depends on no size.
 const ERROR_ROUGHNESS_MIN: f64 = 0.089;
 
-/// Adds a table.
-pub(crate) fn plan_lut(planner: &mut Planner, name: &str, config: &LutConfig) {
+/// What the analytic fits that some shaders use in a table's place are off by, as a dielectric's reflectance.
+fn fits(masking: Masking) -> Value {
+    let error = |fit: fn(f64, f64) -> [f64; 2]| {
+        let error = kiln_bake::fit_error(masking, FIT_CELLS, fit).dielectric;
+        json!({"rms": error.rms, "largest": error.worst})
+    };
+    json!({"karis_mobile": error(kiln_bake::fit_karis_mobile), "lazarov": error(kiln_bake::fit_lazarov)})
+}
+
+/// Cells along a side of the grid on which the fits are compared.
+const FIT_CELLS: usize = 32;
+
+/// Adds a table; its errors are integrated too if they are to be stated, which takes longer than the table.
+pub(crate) fn plan_lut(planner: &mut Planner, name: &str, config: &LutConfig, states_errors: bool) {
     let config = *config;
     let axes = match config.axes {
         TableAxes::Uniform => "x = n.v, y = perceptual roughness",
         TableAxes::Graded => "x = cbrt(n.v), y = sqrt(perceptual roughness)",
     };
-    let params = json!({"kind": table_name(config.table), "size": config.size, "axes": axes});
-    let is_default = config == DEFAULT;
+    let mut params = json!({"kind": table_name(config.table), "size": config.size, "axes": axes});
+    if states_errors {
+        params["states"] = json!("errors");
+    }
     let action = planner.graph.add(Action {
         name: format!("integrate lut/{name}"),
         command: command("brdf table", 2, params, &["texels"]),
@@ -36,14 +50,16 @@ pub(crate) fn plan_lut(planner: &mut Planner, name: &str, config: &LutConfig) {
             let LutConfig { table, size, axes } = config;
             let values = kiln_bake::table(table, axes, size, cancel(inputs)).map_err(ended)?;
             let mut meta = json!({});
-            // The default's is known: see `kiln_bake::TABLE_SIZE`.
-            if !is_default && size > 1 {
+            if states_errors && size > 1 {
                 let from = ERROR_ROUGHNESS_MIN;
                 let error = kiln_bake::table_error(table, axes, size, &values, from, cancel(inputs));
                 let error = error.map_err(ended)?;
                 meta["detail"] = json!({
                     "lookup_error": {"from_roughness": from, "rms": error.rms, "largest": error.worst},
                 });
+                if let Table::GgxScaleBias(masking) = table {
+                    meta["detail"]["fits"] = fits(masking);
+                }
             }
             // A lone channel is stored with a second one of zeros.
             let pairs = values

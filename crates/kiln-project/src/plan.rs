@@ -167,10 +167,10 @@ pub(crate) fn plan_project(
     }
     // What the preview's shaders read.
     if !project.envs.is_empty() && !project.is_without_default_lut && !project.luts.contains_key("ggx") {
-        lut::plan_lut(&mut planner, "ggx", &lut::DEFAULT);
+        lut::plan_lut(&mut planner, "ggx", &lut::DEFAULT, false);
     }
     for (name, config) in &project.luts {
-        lut::plan_lut(&mut planner, name, config);
+        lut::plan_lut(&mut planner, name, config, !project.is_without_default_lut);
     }
     let meta = json!({
         "name": project.name,

@@ -179,6 +179,10 @@ pub(crate) struct EnvArgs {
     /// Cut radiance above this; what is lost is printed
     #[arg(long)]
     pub(crate) max_radiance: Option<f64>,
+    /// Also write the skybox as a picture: cross, cross-tall, strip, strip-tall, faces, octahedral or equirect, and
+    /// .exr, .hdr or .png, as cross.exr
+    #[arg(long, value_name = "LAYOUT.TYPE")]
+    pub(crate) picture: Option<crate::commands::cube_picture::Picture>,
     #[command(flatten)]
     pub(crate) run: RunArgs,
 }

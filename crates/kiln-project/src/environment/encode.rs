@@ -66,7 +66,7 @@ impl Encode {
             return Vec::new();
         }
         let message = format!(
-            "the peak {:.3e} is above the half float's 65504: texels are stored divided by 2^{}",
+            "the peak {:.3e} is above 65000, where half floats end but for a margin: texels are stored divided by 2^{}",
             self.max, self.scale_log2
         );
         let help =
@@ -83,7 +83,13 @@ impl Encode {
                 "`format = \"{name}\"` alone rounds the skybox by {:.1e}, more than `error = {error}`",
                 skybox.rounding_rms
             );
-            said.push(Diagnostic::note(message).with_help("`format = \"rgba16f\"` rounds by 2e-4"));
+            let better = match self.format {
+                TexelFormat::Rgba32Float | TexelFormat::Rgba16Float => {
+                    "`format = \"rgba32f\"` rounds by 3e-8"
+                }
+                _ => "`format = \"rgba16f\"` rounds by 2e-4",
+            };
+            said.push(Diagnostic::note(message).with_help(better));
         }
         if skybox.clamped_flux > 0.0 {
             let message = format!(

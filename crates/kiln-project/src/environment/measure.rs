@@ -20,7 +20,7 @@ impl Steps<'_> {
     /// Measures the levels of one target. The result is a list as long as `subjects`, as text and among the facts.
     pub(super) fn measure(&self, map: &str, decode: ActionId, subjects: Vec<Subject>) -> Action {
         let env = self.env.clone();
-        let mut inputs: Vec<Input> = vec![output(decode, "environment"), output(decode, "report")];
+        let mut inputs: Vec<Input> = vec![self.light(decode), output(decode, "report")];
         inputs.extend(subjects.iter().map(|subject| output(subject.level, LEVEL)));
         let lobes: Vec<String> =
             subjects.iter().map(|subject| format!("{:?} {}", subject.lobe, subject.face_size)).collect();
@@ -29,7 +29,7 @@ impl Steps<'_> {
         let command = command("measure", 1, params, &["json"]);
         let action = self.action(&format!("/{map}"), command, inputs, move |inputs| {
             let cancel = cancel(inputs);
-            let truth = BruteForce::new(&*panorama(inputs, 0, env.texels)?, cancel).map_err(ended)?;
+            let truth = BruteForce::new(&*panorama(inputs, 0)?, cancel).map_err(ended)?;
             let encode = Encode::new(&env, &report(inputs, 1)?);
             let mut facts: Vec<Value> = Vec::new();
             for (index, subject) in subjects.iter().enumerate() {

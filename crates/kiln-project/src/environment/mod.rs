@@ -13,7 +13,7 @@ use kiln_build::{
     Action, ActionId, ActionOutput, Command, Engine, Error, Input, Inputs, MemoryNeed, little_memory,
 };
 use kiln_diagnostic::Diagnostic;
-use kiln_image::{Environment, Panorama, TexelPolicy};
+use kiln_image::{Environment, Layout, Panorama, TexelPolicy};
 use serde_json::{Value, json};
 
 use crate::blob::{decode_environment, environment_size};
@@ -174,12 +174,15 @@ impl Steps<'_> {
                 params[key] = value;
             }
         }
-        let outputs: &[&str] = match self.env.is_sun_extracted {
-            true => &["sun", "environment", "report"],
-            false => &["environment", "report"],
-        };
+        let mut outputs = vec!["environment", "report"];
+        if self.env.is_sun_extracted {
+            outputs.push("sun");
+        }
+        if self.env.texels == TexelPolicy::Keep {
+            outputs.push("light");
+        }
         let env = self.env.clone();
-        let action = self.action("", command("decode", 3, params, outputs), inputs, move |inputs| {
+        let action = self.action("", command("decode", 3, params, &outputs), inputs, move |inputs| {
             let files: Vec<Option<Arc<[u8]>>> =
                 (0..env.sources.len()).map(|index| inputs.bytes(index)).collect::<Result<_, _>>()?;
             let present: Vec<&[u8]> = files.iter().flatten().map(|bytes| &**bytes).collect();
@@ -190,7 +193,18 @@ impl Steps<'_> {
             }
             source::decode(&present, &env, cancel(inputs))
         });
-        let memory = |lengths: &[usize]| kiln_bake::memory::decode(lengths.iter().sum());
+        let is_octahedral = self.env.layout == Some(Layout::Octahedral);
+        let is_sun_extracted = self.env.is_sun_extracted;
+        let is_kept = self.env.texels == TexelPolicy::Keep;
+        let memory = move |lengths: &[usize]| {
+            let bytes = lengths.iter().sum();
+            let decode = match is_octahedral {
+                true => kiln_bake::memory::decode_octahedral(bytes),
+                false => kiln_bake::memory::decode(bytes),
+            };
+            // A second environment without the sun, and one for light maps.
+            decode * (1 + usize::from(is_sun_extracted) + usize::from(is_kept))
+        };
         Action { memory: needs(memory), ..action }
     }
 
@@ -205,26 +219,32 @@ impl Steps<'_> {
         if let Some(alpha) = sheen {
             params["sheen_alpha_min"] = json!(alpha);
         }
-        let policy = self.env.texels;
         let command = command("analyse", 2, params, &["analysis"]);
-        let action = self.action("", command, vec![output(decode, "environment")], move |inputs| {
+        let action = self.action("", command, vec![self.light(decode)], move |inputs| {
             let cancel = cancel(inputs);
-            let panorama = panorama(inputs, 0, policy)?;
+            let panorama = panorama(inputs, 0)?;
             let analysis = kiln_bake::analyse(&panorama, &request, cancel).map_err(ended)?;
             let meta = json!({"detail": {"band_limit": analysis.band_limit(), "mean": analysis.mean()}});
             Ok(success("analysis", analysis.to_bytes(cancel).map_err(ended)?, meta))
         });
         let memory = |lengths: &[usize]| {
             let (width, height) = environment_size(lengths[0]);
-            kiln_bake::memory::analyse(width, height)
+            // A cube becomes a panorama first.
+            kiln_bake::memory::analyse(width, height) + kiln_bake::memory::panorama_of_cube(height / 2)
         };
         Action { memory: needs(memory), ..action }
     }
 
+    /// What light maps are made of: the environment without the texels that only the skybox keeps.
+    fn light(&self, decode: ActionId) -> Input {
+        output(decode, if self.env.texels == TexelPolicy::Keep { "light" } else { "environment" })
+    }
+
     fn skybox(&self, decode: ActionId) -> Action {
         let env = self.env.clone();
-        let inputs = vec![output(decode, "environment"), output(decode, "report")];
+        let inputs = vec![output(decode, "environment"), output(decode, "report"), self.light(decode)];
         let mut params = self.encoding();
+        params["error"] = json!(env.error);
         params["mirror_size"] = json!(env.size);
         if let Some(size) = env.skybox_size {
             params["size"] = json!(size);
@@ -236,17 +256,18 @@ impl Steps<'_> {
             let environment = environment(inputs, 0)?;
             let report = report(inputs, 1)?;
             let face_size = env.skybox_size.unwrap_or(report.skybox_size);
-            let cubes = |face_size: usize| match &*environment {
+            let cubes = |environment: &Environment, face_size: usize| match environment {
                 Environment::Panorama(panorama) => kiln_bake::skybox(panorama, face_size, cancel),
                 Environment::Cube(cube) => kiln_bake::skybox_of_cube(cube, face_size, cancel),
             };
-            let levels = cubes(face_size).map_err(ended)?;
+            let levels = cubes(&environment, face_size).map_err(ended)?;
             let encode = Encode::new(&env, &report);
             let encoded: Vec<EncodedLevel> =
                 levels.iter().map(|cube| encode.level(cube, cancel)).collect::<Result<_, _>>()?;
             let mut shared = encode.facts();
             shared["size"] = json!(face_size);
             shared["levels"] = json!(levels.len());
+            shared["source"] = report.source.clone();
             let worst = |error: fn(&EncodedLevel) -> f64| encoded.iter().map(error).fold(0.0, f64::max);
             let detail = json!({
                 "rounding_rms": worst(|level| level.rounding_rms),
@@ -256,9 +277,14 @@ impl Steps<'_> {
             let mut diagnostics = encode.notes();
             diagnostics.extend(encode.cost(&encoded[0], env.error));
             let meta = json!({"shared": shared, "detail": detail});
-            let mirror = match levels.iter().position(|level| level.face_size == env.size) {
+            // The skybox has that level already, unless it keeps texels that reflections must not have.
+            let level = levels.iter().position(|level| level.face_size == env.size);
+            let mirror = match level.filter(|_| env.texels != TexelPolicy::Keep) {
                 Some(level) => encoded[level].bytes.clone(),
-                None => encode.level(&cubes(env.size).map_err(ended)?[0], cancel)?.bytes,
+                None => {
+                    let light = self::environment(inputs, 2)?;
+                    encode.level(&cubes(&light, env.size).map_err(ended)?[0], cancel)?.bytes
+                }
             };
             let name = |index: usize| format!("{LEVELS}/mip{index}");
             let named = encoded.into_iter().enumerate().map(|(index, level)| (name(index), level.bytes));
@@ -326,6 +352,7 @@ impl Steps<'_> {
         let mut params = self.encoding();
         params["size"] = json!(face_size);
         params["alpha"] = json!(alpha);
+        params["roughness"] = json!(roughness);
         let kind = if lobe == LobeKind::Ggx { "prefilter" } else { "prefilter sheen" };
         let command = command(kind, 2, params, &[LEVEL]);
         let bake = move |analysis: &Analysis, cancel: Cancel<'_>| match lobe {
@@ -401,19 +428,15 @@ fn environment(inputs: &Inputs, index: usize) -> Result<Bulk<Environment>, Error
     decode_environment(&inputs.required(index)?, cancel(inputs)).map(Bulk::new)
 }
 
-/// An environment as a panorama of radiance, whatever texels the policy keeps for the skybox.
-fn panorama(inputs: &Inputs, index: usize, policy: TexelPolicy) -> Result<Bulk<Panorama>, Error> {
-    let cancel = cancel(inputs);
-    let environment = environment(inputs, index)?;
-    let mut panorama = Bulk::new(match environment.into_inner() {
+/// An environment as a panorama.
+fn panorama(inputs: &Inputs, index: usize) -> Result<Bulk<Panorama>, Error> {
+    let panorama = match environment(inputs, index)?.into_inner() {
         Environment::Panorama(panorama) => panorama,
-        Environment::Cube(cube) => kiln_bake::panorama_of_cube(&Bulk::new(cube), cancel).map_err(ended)?,
-    });
-    if policy == TexelPolicy::Keep {
-        // Repair refuses nothing.
-        TexelPolicy::Repair.apply(&mut *panorama, cancel).map_err(|_| Error::Cancelled)?;
-    }
-    Ok(panorama)
+        Environment::Cube(cube) => {
+            kiln_bake::panorama_of_cube(&Bulk::new(cube), cancel(inputs)).map_err(ended)?
+        }
+    };
+    Ok(Bulk::new(panorama))
 }
 
 fn analysis(inputs: &Inputs, index: usize) -> Result<Analysis, Error> {

@@ -5,7 +5,7 @@ use kiln_build::{ActionOutput, Error};
 use kiln_diagnostic::Diagnostic;
 use kiln_image::{
     DecodeError, DecodedEnvironment, Environment, Layout, Limits, TexelError, TexelPolicy, TexelReport,
-    check_texels, decode_environment, environment_from_faces, limit_radiance,
+    check_texels, decode_environment, environment_from_faces, limit_radiance, repair_texels,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -15,12 +15,14 @@ use crate::EnvConfig;
 use crate::blob::encode_environment;
 
 /// What later steps must know of a decoded environment without reading it.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Report {
     /// Edge of a skybox that shows all of it.
     pub(super) skybox_size: usize,
     /// Largest value.
     pub(super) max: f32,
+    /// Format, layout, size, and what was wrong with the texels: for the skybox's facts.
+    pub(super) source: Value,
 }
 
 /// Skybox faces follow the source (a quarter of a panorama's width sees as many texels), within these limits.
@@ -44,8 +46,17 @@ pub(super) fn decode(files: &[&[u8]], env: &EnvConfig, cancel: Cancel) -> Result
     };
     // That a panorama is one goes without saying; the layout stands in the facts.
     let said = usize::from(decoded.layout == Layout::Equirect && env.layout.is_none());
-    let mut diagnostics: Vec<Diagnostic> = decoded.notes.drain(..).skip(said).map(Diagnostic::note).collect();
+    // 8 bits hold no sun, and people take such maps for the real thing.
+    let is_ldr = ["PNG", "JPEG"].contains(&decoded.format);
+    let say = if is_ldr { Diagnostic::warning } else { Diagnostic::note };
+    let mut diagnostics: Vec<Diagnostic> = decoded.notes.drain(..).skip(said).map(say).collect();
     let found = check_texels(&decoded, cancel).map_err(ended)?;
+    let mut flux_moved = 0.0;
+    // Light maps are made of radiance, whatever the skybox keeps.
+    let mut light = (env.texels == TexelPolicy::Keep).then(|| Bulk::new(decoded.clone()));
+    if let Some(light) = &mut light {
+        flux_moved = repair_texels(&mut **light, cancel).map_err(ended)?.flux_moved;
+    }
     match env.texels.apply(&mut decoded, cancel) {
         Err(TexelError::Cancelled(cancelled)) => return Err(ended(cancelled)),
         Err(error) => {
@@ -53,6 +64,7 @@ pub(super) fn decode(files: &[&[u8]], env: &EnvConfig, cancel: Cancel) -> Result
             return Ok(failure(Diagnostic::error(error.to_string()).with_help(help)));
         }
         Ok(repair) => {
+            flux_moved = f64::max(flux_moved, repair.flux_moved);
             diagnostics.extend(defects(&found, env.texels));
             if repair.non_finite + repair.negative > 0 {
                 let message = format!(
@@ -65,6 +77,9 @@ pub(super) fn decode(files: &[&[u8]], env: &EnvConfig, cancel: Cancel) -> Result
     }
     if let Some(max) = env.radiance_max {
         let limited = limit_radiance(&mut decoded, max as f32, cancel).map_err(ended)?;
+        if let Some(light) = &mut light {
+            limit_radiance(&mut **light, max as f32, cancel).map_err(ended)?;
+        }
         if limited.limited.count > 0 {
             let lost = 100.0 * limited.fraction_lost();
             let message = format!(
@@ -88,13 +103,31 @@ pub(super) fn decode(files: &[&[u8]], env: &EnvConfig, cancel: Cancel) -> Result
         Environment::Panorama(panorama) => skybox_face_size(panorama.width()),
         Environment::Cube(cube) => cube.face_size.min(*SKYBOX_FACES.end()),
     };
-    let report = serde_json::to_vec(&Report { skybox_size, max }).unwrap_or_default();
-    let facts =
-        json!({"format": format, "layout": layout.name(), "size": environment.size_text(), "max": max});
+    let source = json!({
+        "format": format,
+        "layout": layout.name(),
+        "size": environment.size_text(),
+        "texels": {
+            "nan": found.nan.count,
+            "infinite": found.infinite.count,
+            "negative": found.negative.count,
+            "out_of_gamut": found.out_of_gamut.count,
+            "above_f16": found.above_f16.count,
+            "flux_moved": if flux_moved.is_finite() { json!(flux_moved) } else { json!(flux_moved.to_string()) },
+        },
+    });
+    // Where nothing is finite there is no largest value.
+    let max = if max.is_finite() { max } else { 0.0 };
+    let meta = json!({"detail": source});
+    let report = serde_json::to_vec(&Report { skybox_size, max, source }).unwrap_or_default();
     let environment = Bulk::new(environment);
+    if let Some(light) = light {
+        let light = Bulk::new(light.into_inner().environment);
+        outputs.push(("light".to_owned(), encode_environment(&light, cancel).map_err(ended)?));
+    }
     let stored = encode_environment(&environment, cancel).map_err(ended)?;
     outputs.extend([("environment".to_owned(), stored), ("report".to_owned(), report)]);
-    Ok(ActionOutput { outputs, meta: json!({"detail": facts}), diagnostics })
+    Ok(ActionOutput { outputs, meta, diagnostics })
 }
 
 fn explain(error: &DecodeError) -> Diagnostic {
@@ -119,6 +152,7 @@ fn defects(found: &TexelReport, policy: TexelPolicy) -> Vec<Diagnostic> {
     say("NaN", &found.nan);
     say("infinite", &found.infinite);
     say("negative", &found.negative);
+    say("above-65504 (beyond half floats)", &found.above_f16);
     say("out-of-gamut (negative in Rec. 709 by conversion, kept)", &found.out_of_gamut);
     if policy == TexelPolicy::Keep && found.nan.count + found.infinite.count + found.negative.count > 0 {
         let message =

@@ -14,6 +14,7 @@ use kiln_project::{
 use serde_json::{Value, json};
 
 use crate::args::EnvArgs;
+use crate::commands::cube_picture as picture;
 use crate::commands::export::{export_with_progress, finish, parse_format, with_progress};
 use crate::out::say;
 use crate::place::WrongInput;
@@ -48,6 +49,11 @@ pub(crate) fn run(args: &EnvArgs) -> anyhow::Result<ExitCode> {
     let mut built = built.context("baking")?.context("the bake was cancelled")?;
     built.diagnostics = with_files(&built.diagnostics, &inputs);
     let maps = write_maps(&engine, &built, &project, &out)?;
+    if let Some(picture) = args.picture {
+        for (name, (targets, _)) in &maps {
+            picture::write(&engine, &targets["skybox"], picture, &out.join(name))?;
+        }
+    }
     let failed: Vec<&String> = project.envs.keys().filter(|name| !maps.contains_key(*name)).collect();
     if args.run.json {
         let environments: serde_json::Map<String, Value> = maps
@@ -81,7 +87,17 @@ fn inputs(args: &EnvArgs) -> anyhow::Result<BTreeMap<String, Vec<PathBuf>>> {
             return Err(wrong(format!("{} is no file that can be read", file.display())));
         }
     }
+    if let Some(name) = &args.name
+        && (name.is_empty() || name_of_text(name) != *name)
+    {
+        return Err(wrong(format!(
+            "--name `{name}`: names have letters, digits, `-` and `_` only, at most 64"
+        )));
+    }
     if args.faces {
+        if args.layout != "auto" {
+            return Err(wrong("--faces says the layout; leave --layout out".to_owned()));
+        }
         if args.files.len() != FACE_NAMES.len() {
             let message =
                 format!("--faces needs six files, {}, not {}", FACE_NAMES.join(" "), args.files.len());
@@ -106,13 +122,16 @@ fn inputs(args: &EnvArgs) -> anyhow::Result<BTreeMap<String, Vec<PathBuf>>> {
 
 /// A file's name as an environment's: letters, digits, `-` and `_`.
 fn name_of(file: &Path) -> String {
-    let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+    let name = name_of_text(&file.file_stem().unwrap_or_default().to_string_lossy());
+    if name.is_empty() { "env".to_owned() } else { name }
+}
+
+fn name_of_text(text: &str) -> String {
     let fit = |character: char| match character {
         character if character.is_ascii_alphanumeric() || "-_".contains(character) => character,
         _ => '-',
     };
-    let name: String = stem.chars().take(64).map(fit).collect();
-    if name.is_empty() { "env".to_owned() } else { name }
+    text.chars().take(64).map(fit).collect()
 }
 
 fn link(file: &Path, link: &Path) -> anyhow::Result<()> {
@@ -132,6 +151,9 @@ fn config(args: &EnvArgs, sources: Vec<String>) -> anyhow::Result<EnvConfig> {
     }
     if !(1e-7..=1.0).contains(&args.error) {
         return Err(wrong(format!("--error {} is not from 1e-7 to 1", args.error)));
+    }
+    if args.skybox_size.is_some_and(|size| !(1..=4096).contains(&size)) {
+        return Err(wrong("--skybox-size goes from 1 to 4096".to_owned()));
     }
     if args.sh_order > 8 || !(1..=1024).contains(&args.irradiance_size) {
         return Err(wrong("--sh-order goes from 0 to 8, --irradiance-size from 1 to 1024".to_owned()));
@@ -156,11 +178,41 @@ fn config(args: &EnvArgs, sources: Vec<String>) -> anyhow::Result<EnvConfig> {
     let policies =
         [("repair", TexelPolicy::Repair), ("error", TexelPolicy::Error), ("keep", TexelPolicy::Keep)];
     env.texels = choice("--texels", &args.texels, &policies)?;
-    if args.max_radiance.is_some_and(|max| max.is_nan() || max <= 0.0) {
-        return Err(wrong("--max-radiance must be above 0".to_owned()));
+    if args.max_radiance.is_some_and(|max| !(1e-30..=1e38).contains(&max)) {
+        return Err(wrong("--max-radiance goes from 1e-30 to 1e38".to_owned()));
     }
+    if env.is_sun_extracted && env.texels == TexelPolicy::Keep {
+        return Err(wrong("--sun extract needs radiance: not with --texels keep".to_owned()));
+    }
+    if matches!(env.law, RoughnessLaw::Custom(_)) && args.levels.is_some() {
+        return Err(wrong("a list in --law says the number of levels; leave --levels out".to_owned()));
+    }
+    refuse_what_a_preset_decides(args)?;
     env.radiance_max = args.max_radiance;
     Ok(env)
+}
+
+/// An engine's conventions leave no choice in these.
+fn refuse_what_a_preset_decides(args: &EnvArgs) -> anyhow::Result<()> {
+    let Some(preset) = args.preset else { return Ok(()) };
+    let given = [
+        ("--law", args.law != "linear"),
+        ("--levels", args.levels.is_some()),
+        ("--skybox-size", args.skybox_size.is_some()),
+        ("--irradiance-size", args.irradiance_size != 64),
+        ("--sheen", args.sheen),
+        ("--sh-order", args.sh_order != 2),
+        ("--dering", args.dering),
+        ("--range", args.range != "scale"),
+        ("--picture", args.picture.is_some()),
+    ];
+    match given.into_iter().find(|(_, is_given)| *is_given) {
+        Some((flag, _)) => {
+            Err(WrongInput(format!("{flag} has no effect with --for {preset}: its conventions decide"))
+                .into())
+        }
+        None => Ok(()),
+    }
 }
 
 fn choice<T: Copy>(flag: &str, word: &str, choices: &[(&str, T)]) -> anyhow::Result<T> {
@@ -228,7 +280,10 @@ fn write_maps(
 }
 
 fn print_maps(name: &str, targets: &BTreeMap<String, Target>, written: &Written, out: &Path) {
-    say!("{name}: {} in {}", report::count(targets.len(), "map"), out.join(name).display());
+    let source = targets.get("skybox").and_then(|skybox| skybox.meta.get("source"));
+    let fact = |key: &str| source.and_then(|source| source.get(key)?.as_str()).unwrap_or_default();
+    let place = out.join(name);
+    say!("{name}: {} {} ({}), in {}", fact("layout"), fact("size"), fact("format"), place.display());
     for (map, target) in targets {
         let fact = |key: &str| target.meta.get(key).and_then(Value::as_u64);
         let format = target.meta.get("format").and_then(Value::as_str).unwrap_or("json");

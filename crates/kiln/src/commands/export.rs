@@ -9,10 +9,10 @@ use anyhow::Context as _;
 use kiln_build::{Disk, Engine, RunOptions, write_atomically};
 use kiln_diagnostic::has_errors;
 use kiln_project::{
-    ExportFailure, ExportFile, Exported, FORMATS, PROJECT_FILE, Preset, Project, TexelFormat, parse_project,
-    suggest,
+    CONVENTIONS_FILE, ExportFailure, ExportFile, Exported, FORMATS, PROJECT_FILE, Preset, Project,
+    TexelFormat, parse_project, suggest,
 };
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::args::{ExportArgs, RunArgs};
 use crate::commands::bake::{progress_bar, show_progress};
@@ -93,9 +93,10 @@ pub(crate) fn finish(
     out: &Path,
     run: &RunArgs,
 ) -> anyhow::Result<ExitCode> {
-    let mut written: BTreeMap<&str, Vec<serde_json::Value>> = BTreeMap::new();
+    let mut written: BTreeMap<&str, Vec<Value>> = BTreeMap::new();
     for (name, files) in &exported.files {
         let folder = out.join(name);
+        remove_stale(&folder, files);
         for file in files {
             let is_new = write_if_changed(&folder, file)?;
             let facts = json!({"path": format!("{name}/{}", file.path), "bytes": file.bytes.len(), "written": is_new});
@@ -131,6 +132,24 @@ pub(crate) fn finish(
     }
     let is_good = failed.is_empty() && !has_errors(&built.diagnostics);
     Ok(if is_good { ExitCode::SUCCESS } else { ExitCode::from(INPUT_IS_WRONG) })
+}
+
+/// Removes what an earlier export left in the folder and this one does not make: only files that its conventions name.
+fn remove_stale(folder: &Path, files: &[ExportFile]) {
+    let facts: Option<Value> =
+        std::fs::read(folder.join(CONVENTIONS_FILE)).ok().and_then(|text| serde_json::from_slice(&text).ok());
+    let facts = facts.unwrap_or_default();
+    let paths = facts["files"].as_array().into_iter().flatten().flat_map(|file| match &file["path"] {
+        Value::Array(paths) => paths.iter().filter_map(Value::as_str).collect::<Vec<_>>(),
+        path => path.as_str().into_iter().collect(),
+    });
+    for path in paths.filter(|path| !files.iter().any(|file| file.path == **path)) {
+        let is_here = Path::new(path).components().count() == 1 && !path.starts_with('.');
+        if is_here {
+            // It may be gone already.
+            let _ = std::fs::remove_file(folder.join(path));
+        }
+    }
 }
 
 /// Whether the file was not there with this content.

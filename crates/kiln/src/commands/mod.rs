@@ -1,6 +1,7 @@
 //! One module a command.
 
 pub(crate) mod bake;
+pub(crate) mod cube_picture;
 pub(crate) mod demo;
 pub(crate) mod doctor;
 pub(crate) mod env;
