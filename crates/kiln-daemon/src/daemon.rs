@@ -236,11 +236,7 @@ impl Daemon {
             BuildResult::Done(_) | BuildResult::Failed(_) => Batch::default(),
         };
         unseen.merge(self.building.take().unwrap_or_default());
-        match result {
-            BuildResult::Done(table) => self.publish(*table, notify),
-            BuildResult::Failed(error) => notify(Notice::Failed(error.to_string())),
-            BuildResult::Cancelled(_) | BuildResult::OutputsFailed(_) | BuildResult::Overlooked(_) => {}
-        }
+        // Before anybody hears of the build: what is edited in answer to it must be noticed.
         // Sources that became relevant with this build may have changed before they were watched, and a link may lead
         // elsewhere now.
         let sources = self.engine.sources();
@@ -258,6 +254,11 @@ impl Daemon {
             let changed = sources.changed_since_seen(new, || true);
             unseen.merge(Batch::now(self.watch.with_other_names(changed)));
             self.relevant = relevant;
+        }
+        match result {
+            BuildResult::Done(table) => self.publish(*table, notify),
+            BuildResult::Failed(error) => notify(Notice::Failed(error.to_string())),
+            BuildResult::Cancelled(_) | BuildResult::OutputsFailed(_) | BuildResult::Overlooked(_) => {}
         }
         if !unseen.files.is_empty() {
             notify(Notice::Building { files: unseen.files.iter().cloned().collect() });

@@ -182,7 +182,7 @@ impl Steps<'_> {
             outputs.push("light");
         }
         let env = self.env.clone();
-        let action = self.action("", command("decode", 3, params, &outputs), inputs, move |inputs| {
+        let action = self.action("", command("decode", 4, params, &outputs), inputs, move |inputs| {
             let files: Vec<Option<Arc<[u8]>>> =
                 (0..env.sources.len()).map(|index| inputs.bytes(index)).collect::<Result<_, _>>()?;
             let present: Vec<&[u8]> = files.iter().flatten().map(|bytes| &**bytes).collect();
