@@ -8,8 +8,7 @@ use crate::prefilter::usable;
 use kiln_image::{Cube, Panorama};
 use kiln_sphere::direction::cube_texel_centre;
 use kiln_sphere::{
-    Bulk, Cancel, Cancelled, Lobe, Profile, ZonalKernel, cube_direction, cube_face_st, panorama_direction,
-    simd,
+    Cancel, Cancelled, Lobe, Profile, ZonalKernel, cube_direction, cube_face_st, panorama_direction, simd,
 };
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -37,29 +36,30 @@ const ADAPTIVE: f64 = 8.0;
 /// … and nearer than this by four points; farther away its middle stands for it.
 const FOUR_POINTS: f64 = 64.0;
 
+/// Red, green, blue and the largest of them, of one row, padded.
+type Planes = [Vec<f32>; 4];
+
 /// A panorama made ready for brute force.
-pub struct BruteForce {
+pub struct BruteForce<'a> {
+    panorama: &'a Panorama,
     width: usize,
     height: usize,
     /// Columns with padding.
     stride: usize,
-    /// Red, green, blue and the largest of them, row by row.
-    planes: Bulk<[Vec<f32>; 4]>,
     /// Largest value of each row.
     row_max: Vec<f32>,
     mean: [f64; 3],
     brightest: [f64; 3],
 }
 
-impl BruteForce {
+impl<'a> BruteForce<'a> {
     /// Prepares a panorama.
     ///
     /// # Errors
     /// [`Cancelled`] within a row's work.
-    pub fn new(panorama: &Panorama, cancel: Cancel) -> Result<Self, Cancelled> {
+    pub fn new(panorama: &'a Panorama, cancel: Cancel) -> Result<Self, Cancelled> {
         let (width, height) = (panorama.width(), panorama.height());
         let stride = width.next_multiple_of(LANES);
-        let mut planes = Bulk::new(std::array::from_fn(|_| vec![0.0; stride * height]));
         let mut row_maxima = Vec::with_capacity(height);
         let (mut sum, mut total, mut brightest) = ([0.0; 3], 0.0, (f32::NEG_INFINITY, 0));
         for (row, texels) in panorama.rgb().chunks_exact(width * 3).enumerate() {
@@ -73,10 +73,6 @@ impl BruteForce {
                     brightest = (largest, row * width + column);
                 }
                 row_max = row_max.max(largest);
-                let values = [texel[0], texel[1], texel[2], largest];
-                for (plane, value) in planes.iter_mut().zip(values) {
-                    plane[row * stride + column] = value;
-                }
                 for (sum, &value) in row_sum.iter_mut().zip(texel) {
                     *sum += f64::from(value);
                 }
@@ -89,7 +85,7 @@ impl BruteForce {
         }
         let brightest = Patch::of_texel(width, height, brightest.1).nodes(1)[0].direction;
         let mean = sum.map(|sum| sum / total);
-        Ok(Self { width, height, stride, planes, row_max: row_maxima, mean, brightest })
+        Ok(Self { panorama, width, height, stride, row_max: row_maxima, mean, brightest })
     }
 
     /// Where the brightest texel is.
@@ -146,18 +142,22 @@ impl BruteForce {
         cancel: Cancel,
     ) -> Result<Vec<[f64; 3]>, Cancelled> {
         let views: Vec<_> = axes.iter().map(|&axis| View::new(self, kernel, axis)).collect();
-        let row = |row: usize| -> Result<Vec<[f64; 3]>, Cancelled> {
+        let row = |planes: &mut Planes, row: usize| -> Result<Vec<[f64; 3]>, Cancelled> {
             cancel.check()?;
+            self.fill(planes, row);
+            let planes: &Planes = planes;
             let of_view = |view: &View<_>| {
                 simd::dispatch(
                     #[inline(always)]
-                    || view.row(row),
+                    || view.row(row, planes),
                 )
             };
             Ok(views.iter().map(of_view).collect())
         };
-        let rows: Vec<_> =
-            (0..self.height).into_par_iter().with_min_len(16).map(row).collect::<Result<_, _>>()?;
+        let rows = (0..self.height).into_par_iter().with_min_len(16);
+        let rows: Vec<_> = rows
+            .map_init(|| std::array::from_fn(|_| vec![0.0; self.stride]), row)
+            .collect::<Result<_, _>>()?;
         let mut sums = vec![[0.0; 3]; axes.len()];
         for row in rows {
             for (sum, row) in sums.iter_mut().zip(row) {
@@ -165,6 +165,16 @@ impl BruteForce {
             }
         }
         Ok(sums)
+    }
+
+    /// The planes of a row. The panorama itself may be too large for another copy.
+    fn fill(&self, planes: &mut Planes, row: usize) {
+        for (column, texel) in self.panorama.image().row(row).chunks_exact(3).enumerate() {
+            let largest = texel[0].max(texel[1]).max(texel[2]);
+            for (plane, value) in planes.iter_mut().zip([texel[0], texel[1], texel[2], largest]) {
+                plane[column] = value;
+            }
+        }
     }
 
     /// Compares a map of `lobe` with brute force at its probes.
@@ -210,7 +220,7 @@ impl BruteForce {
 
 /// One direction's view of all rows.
 struct View<'a, K> {
-    source: &'a BruteForce,
+    source: &'a BruteForce<'a>,
     kernel: K,
     axis: [f64; 3],
     /// cos(λ − λ_axis) · sin θ_axis of the columns' middles and of their two Gauss points.
@@ -224,7 +234,7 @@ struct View<'a, K> {
 const GAUSS: f64 = 0.577_350_269_189_625_8;
 
 impl<'a, K: ZonalKernel> View<'a, K> {
-    fn new(source: &'a BruteForce, kernel: K, axis: [f64; 3]) -> Self {
+    fn new(source: &'a BruteForce<'a>, kernel: K, axis: [f64; 3]) -> Self {
         let cell = 2.0 * PI / source.width as f64;
         // −sin λ and cos λ are x and z of a direction on the equator.
         let across = [0.0, -GAUSS, GAUSS].map(|y| {
@@ -240,7 +250,7 @@ impl<'a, K: ZonalKernel> View<'a, K> {
     }
 
     #[inline(always)]
-    fn row(&self, row: usize) -> [f64; 3] {
+    fn row(&self, row: usize, planes: &Planes) -> [f64; 3] {
         let Self { source, size, .. } = self;
         let middle = size * (row as f64 + 0.5);
         let centroid = middle + centroid_offset(middle, *size);
@@ -278,11 +288,10 @@ impl<'a, K: ZonalKernel> View<'a, K> {
                 }
             }
             if is_mended {
-                self.mend(row, block, libm::sincos(middle), &mut mass);
+                self.mend(row, block, libm::sincos(middle), &planes[3], &mut mass);
             }
-            for (sum, plane) in sum.iter_mut().zip(source.planes.iter()) {
-                let start = row * source.stride + block;
-                let values: &[f32; LANES] = plane[start..start + LANES].try_into().expect("LANES columns");
+            for (sum, plane) in sum.iter_mut().zip(planes) {
+                let values: &[f32; LANES] = plane[block..block + LANES].try_into().expect("LANES columns");
                 for lane in 0..LANES {
                     sum[lane] += mass[lane] * f64::from(values[lane]);
                 }
@@ -312,14 +321,12 @@ impl<'a, K: ZonalKernel> View<'a, K> {
 
     /// Integrates adaptively what is too near, or bright and cut by the horizon.
     #[inline(never)]
-    fn mend(&self, row: usize, block: usize, (sin, cos): (f64, f64), mass: &mut Lanes) {
-        let Self { source, size, .. } = self;
+    fn mend(&self, row: usize, block: usize, (sin, cos): (f64, f64), brightness: &[f32], mass: &mut Lanes) {
+        let Self { size, .. } = self;
         let limit = (ADAPTIVE * size) * (ADAPTIVE * size);
-        let start = row * source.stride + block;
         let is_near: [bool; LANES] = std::array::from_fn(|lane| {
             let one_minus_x = (1.0 - cos * self.axis[1]) - sin * self.across[0][block + lane];
-            let is_cut =
-                is_on_horizon(2.0 * one_minus_x, *size) && source.planes[3][start + lane] > self.bright;
+            let is_cut = is_on_horizon(2.0 * one_minus_x, *size) && brightness[block + lane] > self.bright;
             let chord2 = (2.0 * one_minus_x).max(0.0);
             let is_near = self.kernel.scale2(chord2) < limit;
             (is_near && !self.kernel.is_negligible((chord2.sqrt() + size) * (chord2.sqrt() + size))) || is_cut

@@ -87,19 +87,17 @@ pub(crate) fn encode_environment(environment: &Environment, cancel: Cancel) -> R
 }
 
 fn smallest(texels: &[[f32; 3]], cancel: Cancel) -> Result<Form, Cancelled> {
-    let mut forms = FORMS.into_iter();
-    let mut form = Form::SharedExponent;
-    'forms: while let Some(next) = forms.next() {
-        form = next;
+    for form in [Form::SharedExponent, Form::Half] {
+        let mut is_held = true;
         for texels in texels.chunks(CHUNK_TEXELS) {
             cancel.check()?;
-            if !form.holds(texels) {
-                continue 'forms;
-            }
+            is_held = is_held && form.holds(texels);
         }
-        break;
+        if is_held {
+            return Ok(form);
+        }
     }
-    Ok(form)
+    Ok(Form::Float)
 }
 
 /// Mantissas and exponent, if they hold the texel exactly.

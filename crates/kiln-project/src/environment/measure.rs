@@ -29,7 +29,8 @@ impl Steps<'_> {
         let command = command("measure", 1, params, &["json"]);
         let action = self.action(&format!("/{map}"), command, inputs, move |inputs| {
             let cancel = cancel(inputs);
-            let truth = BruteForce::new(&*panorama(inputs, 0)?, cancel).map_err(ended)?;
+            let panorama = panorama(inputs, 0)?;
+            let truth = BruteForce::new(&panorama, cancel).map_err(ended)?;
             let encode = Encode::new(&env, &report(inputs, 1)?);
             let mut facts: Vec<Value> = Vec::new();
             for (index, subject) in subjects.iter().enumerate() {
@@ -46,8 +47,8 @@ impl Steps<'_> {
         });
         let memory = |lengths: &[usize]| {
             let (width, height) = environment_size(lengths[0]);
-            // The environment stored, decoded, and in planes; a level stored and decoded.
-            3 * 16 * width * height + 8 * lengths.iter().skip(2).max().copied().unwrap_or(0)
+            // The environment stored and decoded, perhaps from a cube; a level stored and decoded.
+            3 * 12 * width * height + 8 * lengths.iter().skip(2).max().copied().unwrap_or(0)
         };
         Action { memory: needs(memory), ..action }
     }
