@@ -89,6 +89,16 @@ pub fn scale_log2(max_value: f32) -> i32 {
     s
 }
 
+/// The values that an encoded level's bytes stand for; `None` if they are not that many.
+pub fn decode_level(bytes: &[u8], face_size: usize, format: TexelFormat, scale_log2: i32) -> Option<Cube> {
+    let format = format.ktx2();
+    let values = format.decode_image(face_size, face_size, bytes)?;
+    let scale = libm::exp2(f64::from(scale_log2)) as f32;
+    let texels = values.chunks_exact(format.channels());
+    let rgb = texels.flat_map(|texel| [texel[0], texel[1], texel[2]].map(|value| value * scale));
+    Cube::new(face_size, rgb.collect()).ok()
+}
+
 /// Encodes a level's values divided by 2^`scale_log2`.
 ///
 /// Values outside the format's range saturate, never Inf; `clamped_flux` counts that, and the two roundings too.

@@ -43,7 +43,7 @@ pub use kiln_sphere::{Bulk, Cancel, Cancelled, Lobe};
 pub use analysis::{Analysis, AnalysisRequest, BAND_LIMIT_MAX, BRIGHT_MAX, analyse};
 pub use bytes::BakeError;
 pub use dering::{Deringed, dering};
-pub use encode::{EncodedLevel, TexelFormat, encode_level, scale_log2};
+pub use encode::{EncodedLevel, TexelFormat, decode_level, encode_level, scale_log2};
 pub use law::{LawError, RoughnessLaw, roughness_of_level};
 pub use measure::{BruteForce, Measured};
 pub use panorama::panorama_of_cube;

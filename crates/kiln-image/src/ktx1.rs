@@ -123,8 +123,8 @@ pub fn write_cube(cube: &Cube) -> Vec<u8> {
     out
 }
 
-/// Each pair is length, key, NUL, value, NUL, padding to 4.
-fn key_value_data(pairs: &[(String, String)]) -> Vec<u8> {
+/// Each pair is length, key, NUL, value, NUL, padding to 4: in KTX1 and KTX2 alike.
+pub(crate) fn key_value_data(pairs: &[(String, String)]) -> Vec<u8> {
     let mut out = Vec::new();
     for (key, value) in pairs {
         let length = key.len() + value.len() + 2;

@@ -15,7 +15,7 @@ pub use export::{CONVENTIONS_FILE, ExportFailure, Exported, export, wished};
 pub use check::{Difference, DifferenceKind, differences};
 pub use config::{Project, Role, SceneConfig, ShaderConfig, parse_project};
 pub use env_config::{EnvConfig, FORMATS, Range, format_name};
-pub use kiln_bake::{BAND_LIMIT_MAX, RoughnessLaw, TexelFormat, panorama_of_cube};
+pub use kiln_bake::{BAND_LIMIT_MAX, RoughnessLaw, TexelFormat, decode_level, panorama_of_cube};
 pub use kiln_export::{ExportFile, Preset};
 pub use kiln_image::{FACE_NAMES, Layout, TexelPolicy};
 pub use lut_config::{LutConfig, TABLES, table_name};

@@ -124,15 +124,5 @@ fn key_value_data(given: &[(String, String)]) -> Vec<u8> {
         }
     }
     pairs.sort();
-    let mut out = Vec::new();
-    for (key, value) in pairs {
-        let length = key.len() + value.len() + 2;
-        out.extend_from_slice(&(length as u32).to_le_bytes());
-        out.extend_from_slice(key.as_bytes());
-        out.push(0);
-        out.extend_from_slice(value.as_bytes());
-        out.push(0);
-        out.resize(out.len().next_multiple_of(4), 0);
-    }
-    out
+    crate::ktx1::key_value_data(&pairs)
 }

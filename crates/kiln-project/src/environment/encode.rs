@@ -34,12 +34,7 @@ impl Encode {
 
     /// The values that a level's bytes stand for.
     pub(super) fn decode(&self, face_size: usize, bytes: &[u8]) -> Option<Cube> {
-        let format = self.format.ktx2();
-        let values = format.decode_image(face_size, face_size, bytes)?;
-        let scale = (self.scale_log2 as f32).exp2();
-        let texels = values.chunks_exact(format.channels());
-        let rgb = texels.flat_map(|texel| [texel[0], texel[1], texel[2]].map(|value| value * scale));
-        Cube::new(face_size, rgb.collect()).ok()
+        kiln_bake::decode_level(bytes, face_size, self.format, self.scale_log2)
     }
 
     pub(super) fn facts(&self) -> Value {

@@ -109,12 +109,8 @@ fn level_0(engine: &Engine, target: &Target) -> Option<Cube> {
     let size = usize::try_from(target.meta.get("size")?.as_u64()?).ok()?;
     let scale_log2 = target.meta.get("scale_log2").and_then(Value::as_i64).unwrap_or(0);
     let name = target.meta.get("format")?.as_str()?;
-    let format = kiln_project::FORMATS.iter().find(|(known, _)| *known == name)?.1.ktx2();
-    let values = format.decode_image(size, size, &bytes)?;
-    let scale = (scale_log2 as f32).exp2();
-    let texels = values.chunks_exact(format.channels());
-    let rgb = texels.flat_map(|texel| [texel[0], texel[1], texel[2]].map(|value| value * scale));
-    Cube::new(size, rgb.collect()).ok()
+    let format = kiln_project::FORMATS.iter().find(|(known, _)| *known == name)?.1;
+    kiln_project::decode_level(&bytes, size, format, i32::try_from(scale_log2).ok()?)
 }
 
 #[cfg(test)]
