@@ -34,6 +34,8 @@ pub struct Accuracy {
     pub clamped_flux: f64,
     /// Highest degree the transform used.
     pub band_limit: usize,
+    /// Texels that were convolved directly.
+    pub bright_texels: usize,
 }
 
 /// The environment convolved with the GGX lobe of N = V = R, for one mip level.
@@ -207,6 +209,7 @@ fn evaluation_error(error: f64) -> f64 {
 /// How many degrees a map takes and what the others could have added.
 struct Truncation {
     band_limit: usize,
+    bright_texels: usize,
     /// Bound of ∫ |error|² dω.
     energy: f64,
     /// Bound of |error| in any direction.
@@ -241,7 +244,8 @@ impl Truncation {
             sup += kappa.abs() * ((2 * band_limit + 1) as f64 * band / (4.0 * PI)).sqrt();
             band_limit -= 1;
         }
-        Ok(Self { band_limit, energy, sup, map_energy, mean: norm(&analysis.mean()) })
+        let bright_texels = analysis.bright.len();
+        Ok(Self { band_limit, bright_texels, energy, sup, map_energy, mean: norm(&analysis.mean()) })
     }
 
     /// `largest`: norm of the map's brightest texel, which evaluation errors are relative to.
@@ -252,6 +256,7 @@ impl Truncation {
             sup_bound: relative(self.sup + evaluation_error * largest, self.mean),
             clamped_flux,
             band_limit: self.band_limit,
+            bright_texels: self.bright_texels,
         }
     }
 }

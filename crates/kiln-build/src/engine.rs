@@ -21,7 +21,6 @@ use crate::{
 const SCAN_RESULTS_KEPT: usize = 8;
 const MEMORY_FILE: &str = "memory.json";
 pub(crate) const PUBLISHED_FILE: &str = "published.json";
-const OUTPUT_LOCK_FILE: &str = "output.lock";
 const MEMORY_LOCK_FILE: &str = "memory.lock";
 
 /// The engine of one project.
@@ -186,11 +185,6 @@ impl Engine {
             memory.files.insert(name.to_owned(), files);
             memory.is_changed = true;
         }
-    }
-
-    /// Held while the files for engines are written, so that two processes do not mix theirs.
-    pub fn lock_outputs(&self) -> Option<std::fs::File> {
-        self.store.lock_project(&self.project, OUTPUT_LOCK_FILE)
     }
 
     /// Begins a plan. `changed` names the sources that may be different since the last plan; `None` stands for all.

@@ -307,7 +307,7 @@ impl Store {
     }
 
     /// A file of a project that is locked for as long as the returned handle lives; `None` where that cannot be done.
-    pub fn lock_project(&self, project: &Digest, name: &str) -> Option<File> {
+    pub(crate) fn lock_project(&self, project: &Digest, name: &str) -> Option<File> {
         let folder = self.write_root().join(PROJECTS).join(project.to_string());
         self.fs.create_folder(&folder).ok()?;
         let file =

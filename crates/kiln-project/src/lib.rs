@@ -20,7 +20,7 @@ pub use kiln_export::{ExportFile, Preset};
 pub use kiln_image::{FACE_NAMES, Layout, TexelPolicy};
 pub use lut_config::{LutConfig, TABLES, table_name};
 pub use output::{
-    MANIFEST_FILE, Manifest, ManifestFile, ManifestTarget, Written, manifest_of, write_outputs,
+    MANIFEST_FILE, Manifest, ManifestFile, ManifestTarget, Written, lock_folder, manifest_of, write_outputs,
 };
 pub use plan::{PartSpec, Plan, TargetSpec, plan};
 pub use reader::{parse_bytes, suggest};

@@ -1,6 +1,7 @@
 //! Baked files for engines and `manifest.json` for CI.
 
 use std::collections::BTreeMap;
+use std::fs::File;
 use std::path::{Component, Path};
 use std::sync::Arc;
 
@@ -115,11 +116,11 @@ pub fn manifest_of(engine: &Engine, targets: &Targets) -> Result<Manifest, Error
 /// # Errors
 /// A file cannot be read from the store or written.
 pub fn write_outputs(engine: &Engine, targets: &Targets, output_dir: &str) -> Result<Written, Error> {
+    let folder = engine.folder().join(output_dir);
     // Two processes would mix their files.
-    let _lock = engine.lock_outputs();
+    let _lock = lock_folder(&folder);
     let outputs = engine.outputs();
     outputs.refresh();
-    let folder = engine.folder().join(output_dir);
     let old_text = std::fs::read(folder.join(MANIFEST_FILE)).unwrap_or_default();
     let old = Manifest::parse(&old_text).unwrap_or_default();
     let manifest = manifest_of(engine, targets)?;
@@ -159,6 +160,14 @@ pub fn write_outputs(engine: &Engine, targets: &Targets, output_dir: &str) -> Re
     }
     written.manifest = manifest;
     Ok(written)
+}
+
+/// Makes a folder and waits until no other process writes it; released when dropped. `None` where folders cannot be
+/// locked.
+pub fn lock_folder(folder: &Path) -> Option<File> {
+    std::fs::create_dir_all(folder).ok()?;
+    let file = File::open(folder).ok()?;
+    file.lock().ok().map(|()| file)
 }
 
 fn empty_manifest() -> Manifest {

@@ -7,6 +7,7 @@ use crate::panoramas::{resized, studio};
 use kiln_bake::{Analysis, AnalysisRequest, Cancel, Lobe, analyse, irradiance, sh, skybox, specular_level};
 use kiln_image::Panorama;
 use kiln_sphere::simd::{self, Instructions};
+use rayon::prelude::*;
 
 const NEVER: Cancel = Cancel::NEVER;
 const RUNS: usize = 7;
@@ -45,16 +46,18 @@ impl Job {
             let map = specular_level(analysis, self.alpha(level), self.face_size >> level, NEVER);
             map.expect(WANTED).accuracy.band_limit
         };
-        (1..self.level_count).map(level).collect()
+        (1..self.level_count).into_par_iter().map(level).collect()
     }
 
-    /// Everything.
+    /// Everything, as a build runs it: maps that do not need each other side by side.
     fn run(&self, panorama: &Panorama) {
-        let analysis = self.analyse(panorama);
-        self.specular(&analysis);
-        irradiance(&analysis, IRRADIANCE_SIZE, NEVER).expect(WANTED);
-        sh(&analysis, SH_ORDER);
-        skybox(panorama, self.face_size, NEVER).expect(WANTED);
+        let lighting = || {
+            let analysis = self.analyse(panorama);
+            let irradiance = || irradiance(&analysis, IRRADIANCE_SIZE, NEVER).expect(WANTED);
+            rayon::join(|| self.specular(&analysis), irradiance);
+            sh(&analysis, SH_ORDER);
+        };
+        rayon::join(lighting, || skybox(panorama, self.face_size, NEVER).expect(WANTED));
     }
 
     /// Where the time goes.

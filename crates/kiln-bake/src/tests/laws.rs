@@ -322,6 +322,19 @@ fn clamping_moves_less_flux_than_the_error_asked_for() {
 }
 
 #[test]
+fn clamping_law_rejects_an_analysis_with_too_narrow_a_range() {
+    let analysis = analyse(&random(64, 32, 5), &AnalysisRequest { error: 1e-1, ..REQUEST });
+    let narrow = Analysis { range: analysis.mean().map(|mean| [0.0, 0.5 * mean]), ..analysis };
+    let moved = bake(&narrow, Lobe::Lambert, 16).accuracy.clamped_flux;
+    assert!(moved > 1e-1, "half of the light is cut, {moved} is stated");
+}
+
+/// Whether each step of (analysis, maps) work is more than the one before.
+fn climbs(ladder: &[(usize, usize)]) -> bool {
+    ladder.windows(2).all(|steps| steps[0].0 < steps[1].0 && steps[0].1 < steps[1].1)
+}
+
+#[test]
 fn an_error_ten_times_looser_takes_fewer_degrees() {
     let map = random(256, 128, 8);
     let work = |error: f64| {
@@ -330,7 +343,7 @@ fn an_error_ten_times_looser_takes_fewer_degrees() {
         (analysis.band_limit(), LOBES.iter().map(of_lobe).sum::<usize>())
     };
     let ladder = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5].map(work);
-    for (looser, tighter) in ladder.iter().zip(&ladder[1..]) {
-        assert!(looser.0 < tighter.0 && looser.1 < tighter.1, "{ladder:?}");
-    }
+    assert!(climbs(&ladder), "{ladder:?}");
+    // A baker that does not listen does the same work each time.
+    assert!(!climbs(&[ladder[0]; 2]), "{ladder:?}");
 }

@@ -194,13 +194,17 @@ impl Steps<'_> {
             source::decode(&present, &env, cancel(inputs))
         });
         let is_octahedral = self.env.layout == Some(Layout::Octahedral);
+        let is_container = self.env.sources[0].rsplit('.').next().is_some_and(is_container);
         let is_sun_extracted = self.env.is_sun_extracted;
         let is_kept = self.env.texels == TexelPolicy::Keep;
         let memory = move |lengths: &[usize]| {
             let bytes = lengths.iter().sum();
-            let decode = match is_octahedral {
-                true => kiln_bake::memory::decode_octahedral(bytes),
-                false => kiln_bake::memory::decode(bytes),
+            let decode = if is_octahedral {
+                kiln_bake::memory::decode_octahedral(bytes)
+            } else if is_container {
+                kiln_bake::memory::decode_container(bytes)
+            } else {
+                kiln_bake::memory::decode(bytes)
             };
             // A second environment without the sun, and one for light maps.
             decode * (1 + usize::from(is_sun_extracted) + usize::from(is_kept))
@@ -250,7 +254,7 @@ impl Steps<'_> {
             params["size"] = json!(size);
         }
         let (mirror_size, wanted_size) = (env.size, env.skybox_size);
-        let command = command("skybox", 3, params, &[LEVELS, MIRROR]);
+        let command = command("skybox", 4, params, &[LEVELS, MIRROR]);
         let action = self.action("", command, inputs, move |inputs| {
             let cancel = cancel(inputs);
             let environment = environment(inputs, 0)?;
@@ -270,6 +274,7 @@ impl Steps<'_> {
             shared["source"] = report.source.clone();
             let worst = |error: fn(&EncodedLevel) -> f64| encoded.iter().map(error).fold(0.0, f64::max);
             let detail = json!({
+                "method": "mean of the source over each texel, by solid angle",
                 "rounding_rms": worst(|level| level.rounding_rms),
                 "rounding_max": worst(|level| level.rounding_max),
                 "clamped_flux": worst(|level| level.clamped_flux),
@@ -305,7 +310,7 @@ impl Steps<'_> {
         let size = self.env.irradiance_size;
         let mut params = self.encoding();
         params["size"] = json!(size);
-        let command = command("irradiance", 2, params, &[LEVEL]);
+        let command = command("irradiance", 3, params, &[LEVEL]);
         let bake =
             move |analysis: &Analysis, cancel: Cancel<'_>| kiln_bake::irradiance(analysis, size, cancel);
         let action = self.map("", command, decode, analyse, json!({}), bake);
@@ -354,7 +359,7 @@ impl Steps<'_> {
         params["alpha"] = json!(alpha);
         params["roughness"] = json!(roughness);
         let kind = if lobe == LobeKind::Ggx { "prefilter" } else { "prefilter sheen" };
-        let command = command(kind, 2, params, &[LEVEL]);
+        let command = command(kind, 3, params, &[LEVEL]);
         let bake = move |analysis: &Analysis, cancel: Cancel<'_>| match lobe {
             LobeKind::Ggx => kiln_bake::specular_level(analysis, alpha, face_size, cancel),
             LobeKind::Charlie => kiln_bake::sheen_level(analysis, alpha, face_size, cancel),
@@ -399,7 +404,9 @@ fn sheen_alpha(roughness: f64) -> f64 {
 
 fn accuracy_facts(accuracy: &Accuracy) -> Value {
     json!({
+        "method": "transform up to band_limit, bright_texels convolved directly",
         "band_limit": accuracy.band_limit,
+        "bright_texels": accuracy.bright_texels,
         "rms_bound": accuracy.rms_bound,
         "sup_bound": accuracy.sup_bound,
         "clamped_flux": accuracy.clamped_flux,
@@ -470,6 +477,11 @@ fn needs(estimate: impl Fn(&[usize]) -> usize + Send + Sync + 'static) -> Arc<Me
 
 fn damaged(what: &str, error: &dyn std::fmt::Display) -> Error {
     Error::Action { action: format!("read {what}"), reason: error.to_string() }
+}
+
+/// Whether a file of this extension holds texels as a GPU has them.
+fn is_container(extension: &str) -> bool {
+    ["ktx2", "ktx", "dds"].iter().any(|known| extension.eq_ignore_ascii_case(known))
 }
 
 fn range_name(range: Range) -> &'static str {

@@ -67,18 +67,24 @@ pub(super) fn decode(files: &[&[u8]], env: &EnvConfig, cancel: Cancel) -> Result
             flux_moved = f64::max(flux_moved, repair.flux_moved);
             diagnostics.extend(defects(&found, env.texels));
             if repair.non_finite + repair.negative > 0 {
+                let moved = if repair.flux_moved.is_finite() {
+                    format!("relative flux moved {:.2e}", repair.flux_moved)
+                } else {
+                    "no light is left".to_owned()
+                };
                 let message = format!(
-                    "repaired {} non-finite and {} negative values; relative flux moved {:.2e}",
-                    repair.non_finite, repair.negative, repair.flux_moved
+                    "repaired {} non-finite and {} negative values; {moved}",
+                    repair.non_finite, repair.negative
                 );
                 diagnostics.push(Diagnostic::warning(message));
             }
         }
     }
     if let Some(max) = env.radiance_max {
-        let limited = limit_radiance(&mut decoded, max as f32, cancel).map_err(ended)?;
+        let mut limited = limit_radiance(&mut decoded, max as f32, cancel).map_err(ended)?;
         if let Some(light) = &mut light {
-            limit_radiance(&mut **light, max as f32, cancel).map_err(ended)?;
+            // Kept negative texels would make nonsense of a share of the light.
+            limited = limit_radiance(&mut **light, max as f32, cancel).map_err(ended)?;
         }
         if limited.limited.count > 0 {
             let lost = 100.0 * limited.fraction_lost();

@@ -96,6 +96,7 @@ pub(crate) fn finish(
     let mut written: BTreeMap<&str, Vec<Value>> = BTreeMap::new();
     for (name, files) in &exported.files {
         let folder = out.join(name);
+        let _lock = kiln_project::lock_folder(&folder);
         remove_stale(&folder, files);
         for file in files {
             let is_new = write_if_changed(&folder, file)?;
