@@ -7,7 +7,7 @@ use std::process::Command;
 use serde_json::Value;
 
 /// From the bottom to the top: a crate may use those before it.
-const LAYERS: [&str; 16] = [
+const LAYERS: [&str; 17] = [
     "kiln-diagnostic",
     "kiln-sphere",
     "kiln-brdf",
@@ -16,6 +16,7 @@ const LAYERS: [&str; 16] = [
     "kiln-export",
     "kiln-gpu",
     "kiln-shader",
+    "kiln-worker",
     "kiln-scene",
     "kiln-build",
     "kiln-link",

@@ -1,8 +1,9 @@
 //! kiln.toml as data.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use kiln_diagnostic::Diagnostic;
+use kiln_shader::Program;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -48,10 +49,12 @@ pub struct SceneConfig {
 /// A shader.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShaderConfig {
-    /// Its root module, a .wgsl file.
-    pub source: String,
+    /// Its files, and how they are to be read.
+    pub program: Program,
     /// What it is used for.
     pub role: Role,
+    /// Feature sets that are compiled whatever scenes ask for.
+    pub variants: BTreeSet<BTreeSet<String>>,
 }
 
 /// What a shader is used for.
@@ -63,6 +66,13 @@ pub enum Role {
     Background,
     /// Turns linear radiance into display values.
     Tonemap,
+    /// Nothing that Kiln draws with: compiled, checked and emitted for an engine.
+    Engine,
+}
+
+impl Role {
+    /// All of them.
+    pub const ALL: [Role; 4] = [Role::Material, Role::Background, Role::Tonemap, Role::Engine];
 }
 
 impl Role {
@@ -72,6 +82,7 @@ impl Role {
             Role::Material => "material",
             Role::Background => "background",
             Role::Tonemap => "tonemap",
+            Role::Engine => "engine",
         }
     }
 }
@@ -260,11 +271,70 @@ fn read_scene(section: &mut Section, envs: &[String], shaders: &[String]) -> Sce
 }
 
 fn read_shader(section: &mut Section, name: &str) -> ShaderConfig {
-    let roles = [Role::Material, Role::Background, Role::Tonemap].map(|role| (role.name(), role));
+    let roles = Role::ALL.map(|role| (role.name(), role));
     // A shader named after a role has it.
     let by_name = roles.iter().find(|(role, _)| *role == name).map_or(Role::Material, |(_, role)| *role);
+    let roots: Vec<String> = match section.texts("source") {
+        Some(sources) => sources.iter().map(|source| normalised(source)).collect(),
+        None => vec![read_source(section, "shaders/pbr/pbr.wgsl")],
+    };
+    let paths =
+        |texts: Option<Vec<String>>| texts.unwrap_or_default().iter().map(|path| normalised(path)).collect();
+    let program = Program {
+        roots,
+        defines: section
+            .texts("defines")
+            .unwrap_or_default()
+            .iter()
+            .map(|define| read_define(define))
+            .collect(),
+        include_dirs: paths(section.texts("include")),
+        prelude: paths(section.texts("prelude")),
+    };
+    check_program(section, &program);
+    let variants = section.texts("variants").unwrap_or_default();
     ShaderConfig {
-        source: read_source(section, "shaders/pbr/pbr.wgsl"),
+        program,
         role: section.choice("role", &roles).unwrap_or(by_name),
+        variants: variants.iter().map(|variant| parse_variant(variant)).collect(),
     }
+}
+
+/// `NAME=VALUE`, or `NAME` for 1, as compilers take it.
+fn read_define(text: &str) -> (String, String) {
+    let (name, value) = text.split_once('=').unwrap_or((text, "1"));
+    (name.trim().to_owned(), value.trim().to_owned())
+}
+
+fn check_program(section: &mut Section, program: &Program) {
+    let is_wgsl = program.subject().ends_with(".wgsl");
+    if program.roots.len() > 1 && program.roots.iter().any(|root| root.ends_with(".wgsl")) {
+        let help = "a WGSL shader has one root module, which imports the others";
+        section.fail(
+            "`source` names several WGSL files".to_owned(),
+            section.place("source"),
+            Some(help.to_owned()),
+        );
+    }
+    for key in ["defines", "include", "prelude"] {
+        if is_wgsl && section.place(key) != section.place("") {
+            let help = "WGSL has `import` and `@if(feature)`".to_owned();
+            section.fail(format!("`{key}` is for GLSL"), section.place(key), Some(help));
+        }
+    }
+}
+
+/// The name of a feature set that targets have: `base`, or features joined by `+`.
+pub fn variant_name(features: &BTreeSet<String>) -> String {
+    if features.is_empty() {
+        "base".to_owned()
+    } else {
+        features.iter().cloned().collect::<Vec<_>>().join("+")
+    }
+}
+
+/// The feature set of a name.
+pub fn parse_variant(name: &str) -> BTreeSet<String> {
+    let features = name.split('+').map(str::trim).filter(|feature| !["", "base"].contains(feature));
+    features.map(str::to_owned).collect()
 }

@@ -50,8 +50,8 @@ pub enum PartSpec {
         /// What it is called in the target.
         part: String,
     },
-    /// The outputs `levels/mip0`, `levels/mip1` … of an action, however many there are.
-    Levels(ActionId),
+    /// The outputs `FOLDER/mip0`, `FOLDER/mip1` … of an action, however many there are and whatever their names.
+    Folder(ActionId, &'static str),
     /// No content: what an action found out about the target, its `facts`, as the target's `measured`.
     Facts(ActionId),
 }
@@ -65,7 +65,7 @@ impl PartSpec {
     /// The action it comes from.
     pub fn action(&self) -> ActionId {
         match self {
-            PartSpec::One { action, .. } | PartSpec::Levels(action) | PartSpec::Facts(action) => *action,
+            PartSpec::One { action, .. } | PartSpec::Folder(action, _) | PartSpec::Facts(action) => *action,
         }
     }
 
@@ -80,11 +80,12 @@ impl PartSpec {
         match self {
             PartSpec::One { output, part, .. } => Some(vec![named(part, outcome.output(output)?)]),
             PartSpec::Facts(_) => outcome.succeeded().then(Vec::new),
-            PartSpec::Levels(_) => {
+            PartSpec::Folder(_, folder) => {
                 let outputs = outcome.record.as_ref()?.result.outputs.iter();
-                let levels =
-                    outputs.filter_map(|output| Some((output.name.strip_prefix("levels/")?, output)));
-                let parts: Vec<Part> = levels.map(|(name, output)| named(name, output)).collect();
+                let parts = outputs.filter_map(|output| {
+                    Some(named(output.name.strip_prefix(folder)?.strip_prefix('/')?, output))
+                });
+                let parts: Vec<Part> = parts.collect();
                 (!parts.is_empty()).then_some(parts)
             }
         }

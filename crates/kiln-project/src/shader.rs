@@ -1,17 +1,20 @@
-//! Actions of `[shader.NAME]` and the BRDF table they read.
+//! Actions of `[shader.NAME]`: one for each feature set that makes a difference.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use kiln_build::{Action, ActionOutput, Engine, Error, Input, little_memory};
+use kiln_build::{Action, ActionId, ActionOutput, Engine, Error, Input, Scan, little_memory};
+use kiln_diagnostic::Diagnostic;
+use kiln_worker::{Died, Reply, Sources, Task};
 use serde_json::{Value, json};
 
+use crate::config::variant_name;
 use crate::environment::{command, failure};
 use crate::plan::{PartSpec, Planner, no_content, rank, unreadable};
-use crate::{Role, ShaderConfig};
+use crate::{PROJECT_FILE, Role, ShaderConfig};
 
 /// Version of the compiler behind both the scan and the action.
-const COMPILE_RECIPE: u32 = 1;
+const COMPILE_RECIPE: u32 = 2;
 
 /// Feature sets that scenes ask of material shaders.
 #[derive(Default)]
@@ -22,16 +25,21 @@ impl Variants {
         self.0.entry(shader.to_owned()).or_default().insert(features);
     }
 
-    /// What is asked of a shader; without a scene the plain variant, so that its errors are seen.
-    fn of(&self, shader: &str, role: Role) -> BTreeSet<BTreeSet<String>> {
-        match (role, self.0.get(shader)) {
-            (Role::Material, Some(asked)) => asked.clone(),
-            _ => BTreeSet::from([BTreeSet::new()]),
+    /// What is asked of a shader, by scenes and by its table; where that is nothing the plain variant, so that its errors
+    /// are seen.
+    fn of(&self, shader: &str, config: &ShaderConfig) -> BTreeSet<BTreeSet<String>> {
+        let mut asked = config.variants.clone();
+        if config.role == Role::Material {
+            asked.extend(self.0.get(shader).into_iter().flatten().cloned());
         }
+        if asked.is_empty() {
+            asked.insert(BTreeSet::new());
+        }
+        asked
     }
 }
 
-/// Adds an action and a target for each variant of a shader.
+/// Adds a target for each variant of a shader, and an action for each that can differ from the others.
 pub(crate) fn plan_shader(
     planner: &mut Planner,
     engine: &Engine,
@@ -39,64 +47,95 @@ pub(crate) fn plan_shader(
     config: &ShaderConfig,
     variants: &Variants,
 ) -> Result<(), Error> {
-    let scan = engine.scan("shader", COMPILE_RECIPE, &config.source, |tracker| {
+    let program = &config.program;
+    // A scan is known by one file; what else decides what it looks at is part of its kind.
+    let kind = format!("shader {}", json!(program));
+    let scan = engine.scan(&kind, COMPILE_RECIPE, program.subject(), |tracker| {
         let mut read = |path: &str| tracker.read(path).map(|bytes| text(&bytes));
-        kiln_shader::scan_dependencies(&config.source, &mut read);
-        (Value::Null, Vec::new())
+        (json!(kiln_shader::scan(program, &mut read).features), Vec::new())
     })?;
-    for features in variants.of(name, config.role) {
-        let variant = match features.len() {
-            0 => "base".to_owned(),
-            _ => features.iter().cloned().collect::<Vec<_>>().join("+"),
-        };
-        let target = format!("shader/{name}/{variant}");
-        let inputs = scan.looked_at.iter();
-        let inputs = inputs.map(|(path, digest)| Input::Source { path: path.clone(), digest: *digest });
-        let meta = json!({"shader": name, "role": config.role.name(), "features": features});
-        let (root, files) = (config.source.clone(), scan.clone());
-        let unreadable = unreadable(engine, &root);
-        let compile = planner.graph.add(Action {
-            name: format!("compile {target}"),
-            command: command(
-                "compile",
-                COMPILE_RECIPE,
-                json!({"root": root, "features": features, "unreadable": unreadable}),
-                &["wgsl", "reflection"],
-            ),
-            inputs: inputs.collect(),
-            rank: rank::SHADER,
-            memory: little_memory(),
-            perform: Arc::new(move |inputs| {
-                let mut contents = BTreeMap::new();
-                for (index, (path, _)) in files.looked_at.iter().enumerate() {
-                    contents.insert(path.as_str(), inputs.bytes(index)?);
-                }
-                let mut read = |path: &str| contents.get(path).cloned().flatten().map(|bytes| text(&bytes));
-                Ok(match read(&root) {
-                    Some(_) => compile(&root, &features, &mut read),
-                    None => failure(no_content("shader", unreadable.as_deref())),
-                })
-            }),
+    let known: BTreeSet<String> = serde_json::from_value(scan.found.clone()).unwrap_or_default();
+    let mut compiled: BTreeMap<BTreeSet<String>, ActionId> = BTreeMap::new();
+    for features in variants.of(name, config) {
+        let variant = variant_name(&features);
+        if let Some(unknown) =
+            config.variants.contains(&features).then(|| features.difference(&known).next()).flatten()
+        {
+            planner.diagnostics.push(unknown_feature(name, &variant, unknown, &known));
+        }
+        // Features that no condition names make no difference.
+        let features: BTreeSet<String> = features.intersection(&known).cloned().collect();
+        let compile = *compiled.entry(features).or_insert_with_key(|features| {
+            planner.graph.add(compile_action(engine, name, config, features, &scan))
         });
-        planner.subjects.insert(compile, config.source.clone());
+        planner.subjects.insert(compile, program.subject().to_owned());
+        let meta =
+            json!({"shader": name, "role": config.role.name(), "features": crate::parse_variant(&variant)});
         let parts = vec![PartSpec::one(compile, "wgsl"), PartSpec::one(compile, "reflection")];
-        planner.target(target, "shader", meta, parts);
+        planner.target(format!("shader/{name}/{variant}"), "shader", meta, parts);
     }
     Ok(())
 }
 
-fn compile(
-    root: &str,
+fn unknown_feature(shader: &str, variant: &str, feature: &str, known: &BTreeSet<String>) -> Diagnostic {
+    let message =
+        format!("[shader.{shader}] lists the variant `{variant}`, but no condition names `{feature}`");
+    let help = crate::suggest(feature, known.iter().map(String::as_str)).unwrap_or_else(|| {
+        format!("its conditions name: {}", known.iter().cloned().collect::<Vec<_>>().join(", "))
+    });
+    Diagnostic::warning(message).in_file(PROJECT_FILE).with_help(help)
+}
+
+fn compile_action(
+    engine: &Engine,
+    name: &str,
+    config: &ShaderConfig,
     features: &BTreeSet<String>,
-    read: &mut dyn FnMut(&str) -> Option<Arc<str>>,
-) -> ActionOutput {
-    let outcome = kiln_shader::compile(root, features, read);
+    scan: &Scan,
+) -> Action {
+    let program = config.program.clone();
+    let inputs = scan.looked_at.iter();
+    let inputs = inputs.map(|(path, digest)| Input::Source { path: path.clone(), digest: *digest });
+    let unreadable = program.roots.iter().find_map(|root| unreadable(engine, root));
+    let (files, features) = (scan.clone(), features.clone());
+    let params = json!({"program": program, "features": features, "unreadable": unreadable});
+    Action {
+        name: format!("compile shader/{name}/{}", variant_name(&features)),
+        command: command("compile", COMPILE_RECIPE, params, &["wgsl", "reflection"]),
+        inputs: inputs.collect(),
+        rank: rank::SHADER,
+        memory: little_memory(),
+        perform: Arc::new(move |inputs| {
+            let mut sources = Sources::default();
+            for (index, (path, _)) in files.looked_at.iter().enumerate() {
+                sources.0.insert(path.clone(), inputs.bytes(index)?.map(|bytes| text(&bytes)));
+            }
+            if let Some(missing) = program.roots.iter().find(|root| sources.read(root).is_none()) {
+                return Ok(failure(no_content("shader", unreadable.as_deref()).in_file(missing)));
+            }
+            let task = Task::Compile { program: program.clone(), features: features.clone(), sources };
+            compile(&task, program.subject())
+        }),
+    }
+}
+
+fn compile(task: &Task, subject: &str) -> Result<ActionOutput, Error> {
+    let outcome = match kiln_worker::run(task) {
+        Ok(Reply::Compiled(outcome)) => outcome,
+        Err(Died::NoWorker(reason)) => {
+            return Err(Error::Action { action: "compile".to_owned(), reason });
+        }
+        Err(died) => return Ok(failure(died.diagnostic(subject))),
+    };
     let diagnostics = outcome.diagnostics;
-    let Some(compiled) = outcome.compiled else { return ActionOutput { diagnostics, ..Default::default() } };
+    let Some(compiled) = outcome.compiled else {
+        return Ok(ActionOutput { diagnostics, ..Default::default() });
+    };
+    // The source map changes with every comment; whoever wants it compiles again, which takes milliseconds.
     let reflection = serde_json::to_vec(&compiled.reflection).unwrap_or_default();
     let outputs =
         vec![("wgsl".to_owned(), compiled.wgsl.into_bytes()), ("reflection".to_owned(), reflection)];
-    ActionOutput { outputs, meta: Value::Null, diagnostics }
+    Ok(ActionOutput { outputs, meta: Value::Null, diagnostics })
 }
 
 /// Shader text that is no UTF-8 shows its wrong bytes as U+FFFD in the diagnostic that follows.

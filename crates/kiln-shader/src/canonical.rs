@@ -3,6 +3,8 @@
 //! naga's writer makes names unique and appends `_` to those that end in a digit. Names that matter outside
 //! (global variables, entry points, struct members, overrides) are therefore handed to it as placeholders
 //! that it leaves alone, and put back into its text; a local that then has the same name gets another.
+//! Names inside functions matter to nobody outside: they are numbered, so that renaming one changes nothing.
+//! [`crate::SourceMap`] has the author's.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -47,6 +49,7 @@ fn unused_constants(module: &Module) -> Vec<naga::Handle<naga::Constant>> {
 pub fn emit(module: &Module, info: &ModuleInfo) -> Result<String, String> {
     let mut module = module.clone();
     let kept = replace_names(&mut module);
+    number_locals(&mut module);
     let text = naga::back::wgsl::write_string(&module, info, WriterFlags::empty())
         .map_err(|error| format!("cannot write canonical WGSL: {error}"))?;
     restore_names(&text, &kept)
@@ -116,6 +119,22 @@ fn replace_names(module: &mut Module) -> Kept {
         kept.hide_global(&mut entry.name);
     }
     kept
+}
+
+/// Names arguments, variables and values by what they are; naga's writer numbers equal names of a function.
+fn number_locals(module: &mut Module) {
+    let functions = module.functions.iter_mut().map(|(_, function)| function);
+    for function in functions.chain(module.entry_points.iter_mut().map(|entry| &mut entry.function)) {
+        for argument in &mut function.arguments {
+            argument.name = Some("argument".to_owned());
+        }
+        for (_, local) in function.local_variables.iter_mut() {
+            local.name = Some("variable".to_owned());
+        }
+        for name in function.named_expressions.values_mut() {
+            "value".clone_into(name);
+        }
+    }
 }
 
 /// A prefix that no name of the module starts with.

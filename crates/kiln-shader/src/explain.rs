@@ -1,17 +1,40 @@
 //! Turns naga's errors into diagnostics at their author's file and line.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use kiln_diagnostic::{Diagnostic, Span};
 
-use crate::front::Fault;
+use crate::front::{self, Fault};
 use crate::join::Linked;
 use crate::link::Graph;
 use crate::suggest;
 use crate::token::{self, Kind};
 
+/// Explains `fault` of the linked text, and what else is wrong: the first fault of every module, since naga stops at its
+/// first.
+pub fn all(graph: &Graph, linked: &Linked, fault: Fault) -> Vec<Diagnostic> {
+    let Fault::Source(_) = fault else { return vec![diagnostic(graph, linked, fault)] };
+    let mut faults: BTreeMap<usize, Diagnostic> = BTreeMap::new();
+    for &index in &graph.order {
+        let is_whole = graph.imports_of(index).iter().all(|module| !faults.contains_key(module));
+        let sound = |module: &&usize| **module == index || !faults.contains_key(*module);
+        let imported: Vec<usize> = graph.imports_of(index).iter().filter(sound).copied().collect();
+        let order: Vec<usize> = imported.into_iter().chain([index]).collect();
+        let linked = Linked::join(graph, &order);
+        let Err(Fault::Source(finding)) = front::check_linked(&linked.text) else { continue };
+        let place = finding.labels.first().and_then(|(range, _)| linked.origin(range.clone()));
+        // What a broken module would have declared is missing, which is no fault of this one.
+        let is_own = is_whole || !finding.message.starts_with("no definition in scope");
+        if place.is_some_and(|(module, _)| module == index) && is_own {
+            faults.insert(index, diagnostic(graph, &linked, Fault::Source(finding)));
+        }
+    }
+    if faults.is_empty() { vec![diagnostic(graph, linked, fault)] } else { faults.into_values().collect() }
+}
+
 /// Explains `fault` of the linked text.
-pub fn diagnostic(graph: &Graph, linked: &Linked, fault: Fault) -> Diagnostic {
+fn diagnostic(graph: &Graph, linked: &Linked, fault: Fault) -> Diagnostic {
     let root = graph.modules.first().map_or("", |module| module.path.as_str());
     match fault {
         Fault::Source(finding) => Finder { graph, linked, root }.diagnostic(finding),
@@ -85,7 +108,7 @@ impl Finder<'_> {
         let text = &self.graph.modules[module].text;
         if message.starts_with("no definition in scope") {
             let globals = self.graph.modules.iter().flat_map(|module| &module.outline.declarations);
-            let globals = globals.map(|name| name.name.as_str());
+            let globals = globals.map(|declaration| declaration.name.name.as_str());
             let builtins = naga::keywords::wgsl::BUILTIN_IDENTIFIERS.iter().copied();
             let names = words(text).into_iter().chain(globals).chain(builtins);
             did_you_mean(self.linked.text.get(linked)?, names)

@@ -5,6 +5,7 @@ use naga::valid::{Capabilities, ModuleInfo, ValidationError, ValidationFlags, Va
 use naga::{Module, WithSpan};
 
 use crate::explain::Finding;
+use crate::source_map::{self, LinkedFunction};
 use crate::{Compiled, canonical, describe, interface, limits};
 
 /// Stack of the thread that naga runs on. Its front end, validator and writer recurse over expressions and
@@ -36,15 +37,36 @@ pub enum Fault {
     Internal(String),
 }
 
+/// A valid linked text.
+#[derive(Debug)]
+pub struct LinkedShader {
+    /// The shader.
+    pub compiled: Compiled,
+    /// Where its functions stand in the linked text.
+    pub functions: Vec<LinkedFunction>,
+}
+
 /// Parses, validates, compacts, emits and reflects.
-pub fn compile_linked(text: &str) -> Result<Compiled, Fault> {
+pub fn compile_linked(text: &str) -> Result<LinkedShader, Fault> {
+    on_deep_stack(text, compile)
+}
+
+/// Parses and validates only; a text without entry points is fine.
+pub fn check_linked(text: &str) -> Result<(), Fault> {
+    on_deep_stack(text, |text| parse(text).map(drop))
+}
+
+fn on_deep_stack<T: Send>(
+    text: &str,
+    work: impl FnOnce(&str) -> Result<T, Fault> + Send,
+) -> Result<T, Fault> {
     if text.len() > limits::LINKED_BYTES_MAX {
         return Err(Fault::TooLong { limit: limits::LINKED_BYTES_MAX, actual: text.len() });
     }
     std::thread::scope(|scope| {
         let builder = std::thread::Builder::new().name("kiln-shader".to_owned()).stack_size(STACK_BYTES);
         let worker = builder
-            .spawn_scoped(scope, || run(text))
+            .spawn_scoped(scope, || work(text))
             .map_err(|error| Fault::Internal(format!("no thread: {error}")))?;
         // naga panics on some hostile input (gfx-rs/wgpu #9499, #7687): that ends this thread only.
         worker.join().unwrap_or_else(|panic| Err(Fault::Internal(panic_text(panic.as_ref()))))
@@ -56,10 +78,14 @@ fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
     text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "panic".to_owned())
 }
 
-fn run(text: &str) -> Result<Compiled, Fault> {
-    let mut module =
-        naga::front::wgsl::parse_str(text).map_err(|error| Fault::Source(parse_finding(&error)))?;
+fn parse(text: &str) -> Result<Module, Fault> {
+    let module = naga::front::wgsl::parse_str(text).map_err(|error| Fault::Source(parse_finding(&error)))?;
     validate(&module).map_err(|error| Fault::Source(validation_finding(&module, &error)))?;
+    Ok(module)
+}
+
+fn compile(text: &str) -> Result<LinkedShader, Fault> {
+    let mut module = parse(text)?;
     if module.entry_points.is_empty() {
         return Err(Fault::NoEntryPoint);
     }
@@ -68,7 +94,8 @@ fn run(text: &str) -> Result<Compiled, Fault> {
     let wgsl = canonical::emit(&module, &info).map_err(Fault::Internal)?;
     let reparsed = naga::front::wgsl::parse_str(&wgsl).map_err(|error| reparse_fault(&error, &wgsl))?;
     let reflection = interface::reflect(&module, &info, &reparsed).map_err(Fault::Internal)?;
-    Ok(Compiled { wgsl, reflection })
+    let functions = source_map::functions(&module, &reparsed);
+    Ok(LinkedShader { compiled: Compiled { wgsl, reflection }, functions })
 }
 
 fn reparse_fault(error: &ParseError, wgsl: &str) -> Fault {

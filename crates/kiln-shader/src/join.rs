@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use crate::link::{Graph, Module};
+use crate::module::Outline;
 use crate::token;
 
 /// Modules joined into one text.
@@ -14,21 +15,22 @@ pub struct Linked {
     segments: Vec<Segment>,
 }
 
-/// A run of bytes that the linked text shares with a module.
+/// A run of bytes that the linked text shares with a module, or has in place of some there.
 #[derive(Clone, Copy, Debug)]
 struct Segment {
     linked_start: usize,
     module: usize,
     module_start: usize,
+    /// Length in the module.
     len: usize,
 }
 
 impl Linked {
-    /// Joins the modules of a graph without errors.
-    pub fn join(graph: &Graph) -> Linked {
+    /// Joins modules of a graph without errors, each of which stands after those it imports.
+    pub fn join(graph: &Graph, order: &[usize]) -> Linked {
         let mut linked = Linked::default();
         let mut seen = BTreeSet::new();
-        for &index in &graph.order {
+        for &index in order {
             let module = &graph.modules[index];
             for directive in &module.outline.directives {
                 if seen.insert(&module.text[directive.clone()]) {
@@ -36,7 +38,7 @@ impl Linked {
                 }
             }
         }
-        for &index in &graph.order {
+        for &index in order {
             linked.push_module(index, &graph.modules[index]);
         }
         linked
@@ -62,26 +64,36 @@ impl Linked {
     }
 
     fn push(&mut self, module: usize, text: &str, range: Range<usize>) {
+        let text = &text[range.clone()];
+        self.push_in_place_of(module, text, range);
+    }
+
+    fn push_in_place_of(&mut self, module: usize, text: &str, range: Range<usize>) {
         let (module_start, len) = (range.start, range.len());
         self.segments.push(Segment { linked_start: self.text.len(), module, module_start, len });
-        self.text.push_str(&text[range]);
+        self.text.push_str(text);
         // Keeps tokens on both sides of a cut apart, and ends a module's last line comment.
         self.text.push('\n');
     }
 
     fn push_module(&mut self, index: usize, module: &Module) {
-        let imports = module.outline.imports.iter().map(|import| &import.range);
-        let mut cuts: Vec<&Range<usize>> =
-            module.cuts.iter().chain(imports).chain(&module.outline.directives).collect();
-        cuts.sort_by_key(|cut| cut.start);
+        let Outline { import_statements, directives, .. } = &module.outline;
+        let cuts = module.cuts.iter().chain(import_statements).chain(directives).map(|cut| (cut, None));
+        let renames = module.renames.iter().map(|(range, name)| (range, Some(name)));
+        let mut cuts: Vec<(&Range<usize>, Option<&String>)> = cuts.chain(renames).collect();
+        cuts.sort_by_key(|(cut, _)| cut.start);
         let mut at = if module.text.starts_with(token::BYTE_ORDER_MARK) {
             token::BYTE_ORDER_MARK.len_utf8()
         } else {
             0
         };
-        for cut in cuts {
+        for (cut, instead) in cuts {
             if at < cut.start {
                 self.push(index, &module.text, at..cut.start);
+            }
+            // A name inside what was cut is cut too.
+            if let Some(name) = instead.filter(|_| at <= cut.start) {
+                self.push_in_place_of(index, name, cut.clone());
             }
             at = at.max(cut.end);
         }

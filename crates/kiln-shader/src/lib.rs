@@ -1,6 +1,6 @@
 //! Links WGSL modules, validates them with naga, reflects their interface and explains what is wrong.
 //!
-//! Start at [`compile`]: a root module and a feature set in, canonical WGSL and its [`Reflection`] out.
+//! Start at [`compile`]: a [`Program`] and a feature set in, canonical WGSL and its [`Reflection`] out.
 //!
 //! Sources are WGSL with a subset of WESL's imports and conditions; `docs/shader-interface.md` describes it.
 //!
@@ -12,9 +12,11 @@
 use std::collections::BTreeSet;
 
 use kiln_diagnostic::Diagnostic;
+use serde::{Deserialize, Serialize};
 
 pub use link::Read;
 pub use reflect::*;
+pub use source_map::{FunctionSource, SourceMap};
 
 mod canonical;
 mod condition;
@@ -28,13 +30,15 @@ mod link;
 mod module;
 mod reflect;
 mod resolve;
+mod scope;
+mod source_map;
 mod suggest;
 #[cfg(test)]
 mod tests;
 mod token;
 
 /// A file that was looked at. Missing ones count too, because their appearance changes the result.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Dependency {
     /// Path relative to the project.
     pub path: String,
@@ -43,7 +47,7 @@ pub struct Dependency {
 }
 
 /// A valid shader.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Compiled {
     /// Canonical WGSL: comments, white space, unused functions and unused constants do not change it.
     /// Global variables, entry points, struct members and overrides have the names their author gave them,
@@ -55,11 +59,13 @@ pub struct Compiled {
 }
 
 /// What a compile gave.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// The shader, unless something is wrong with it.
     pub compiled: Option<Compiled>,
-    /// What is wrong, in the order of modules.
+    /// Where its functions come from.
+    pub source_map: SourceMap,
+    /// What is wrong, the first of each module, in the order in which modules were found.
     pub diagnostics: Vec<Diagnostic>,
     /// Every file looked at, in that order.
     pub dependencies: Vec<Dependency>,
@@ -68,22 +74,70 @@ pub struct Outcome {
     pub features: BTreeSet<String>,
 }
 
-/// Compiles the module `root` for a set of features. `read` gets paths relative to the project and is asked
-/// at most once for each.
-pub fn compile(root: &str, features: &BTreeSet<String>, read: &mut Read<'_>) -> Outcome {
+/// A shader as its author names it.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Program {
+    /// Root files, relative to the project: one WGSL module, or a GLSL file for each stage.
+    pub roots: Vec<String>,
+    /// For GLSL: `#define`s before the first line, as (name, replacement).
+    #[serde(default)]
+    pub defines: Vec<(String, String)>,
+    /// For GLSL: folders in which `#include` looks too, relative to the project.
+    #[serde(default)]
+    pub include_dirs: Vec<String>,
+    /// For GLSL: files whose text goes before each root's, relative to the project.
+    #[serde(default)]
+    pub prelude: Vec<String>,
+}
+
+impl Program {
+    /// A program of one root file.
+    pub fn of(root: &str) -> Program {
+        Program { roots: vec![root.to_owned()], ..Program::default() }
+    }
+
+    /// The file that stands for the program in messages: its first.
+    pub fn subject(&self) -> &str {
+        self.roots.first().map_or("", String::as_str)
+    }
+}
+
+/// Compiles a program for a set of features. `read` gets paths relative to the project and is asked at most once for each.
+pub fn compile(program: &Program, features: &BTreeSet<String>, read: &mut Read<'_>) -> Outcome {
+    let root = program.subject();
     let graph = link::Graph::load(root, condition::Mode::Features(features), read);
     let result = if kiln_diagnostic::has_errors(&graph.diagnostics) {
         Err(Vec::new())
     } else {
-        let linked = join::Linked::join(&graph);
-        front::compile_linked(&linked.text).map_err(|fault| vec![explain::diagnostic(&graph, &linked, fault)])
+        let linked = join::Linked::join(&graph, &graph.order);
+        front::compile_linked(&linked.text)
+            .map(|linked_shader| {
+                (linked_shader.compiled, source_map::place(linked_shader.functions, &graph, &linked))
+            })
+            .map_err(|fault| explain::all(&graph, &linked, fault))
     };
     let link::Graph { dependencies, features, mut diagnostics, .. } = graph;
-    let compiled = result.map_err(|mut found| diagnostics.append(&mut found)).ok();
-    Outcome { compiled, diagnostics, dependencies, features }
+    let (compiled, source_map) = match result {
+        Ok((compiled, source_map)) => (Some(compiled), source_map),
+        Err(mut found) => {
+            diagnostics.append(&mut found);
+            (None, SourceMap::default())
+        }
+    };
+    Outcome { compiled, source_map, diagnostics, dependencies, features }
 }
 
-/// The files that `root` imports, transitively and under any features.
-pub fn scan_dependencies(root: &str, read: &mut Read<'_>) -> Vec<Dependency> {
-    link::Graph::load(root, condition::Mode::Everything, read).dependencies
+/// What a shader may need, under any features.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Scan {
+    /// Files it imports, directly or not.
+    pub dependencies: Vec<Dependency>,
+    /// Features that its conditions name: no other makes a difference.
+    pub features: BTreeSet<String>,
+}
+
+/// Looks at a shader's imports and conditions, without compiling it.
+pub fn scan(program: &Program, read: &mut Read<'_>) -> Scan {
+    let graph = link::Graph::load(program.subject(), condition::Mode::Everything, read);
+    Scan { dependencies: graph.dependencies, features: graph.features }
 }

@@ -8,8 +8,9 @@ use kiln_diagnostic::{Diagnostic, Span};
 
 use crate::condition::{self, Mode};
 use crate::limits;
-use crate::module::{self, Import, Name, Outline};
+use crate::module::{self, Import, Name, Outline, QualifiedName};
 use crate::resolve;
+use crate::scope;
 use crate::token::{self, OpenComment};
 use crate::{Dependency, suggest};
 
@@ -17,7 +18,7 @@ use crate::{Dependency, suggest};
 pub type Read<'a> = dyn FnMut(&str) -> Option<Arc<str>> + 'a;
 
 /// A loaded module.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Module {
     /// Path relative to the project.
     pub path: String,
@@ -29,10 +30,25 @@ pub struct Module {
     hidden: BTreeSet<String>,
     /// What conditions cut.
     pub cuts: Vec<Range<usize>>,
-    /// Module of each of the outline's imports.
-    targets: Vec<Option<usize>>,
+    /// Modules it imports.
+    targets: Vec<usize>,
+    /// Imported names, as they are called here: module and name there.
+    pub names: BTreeMap<String, (usize, String)>,
+    /// Imported modules, as they are called here.
+    namespaces: BTreeMap<String, usize>,
+    /// Names with a path, by their bytes: module and name there.
+    pub paths: Vec<(Range<usize>, (usize, String))>,
+    /// What the linked text has in place of some bytes, in their order.
+    pub renames: Vec<(Range<usize>, String)>,
     /// The first import that led here.
     imported_by: Option<(usize, Range<usize>)>,
+}
+
+impl Module {
+    /// Whether every name it imports is called here as it is there.
+    pub fn has_plain_names(&self) -> bool {
+        self.paths.is_empty() && self.names.iter().all(|(local, (_, name))| local == name)
+    }
 }
 
 /// All modules that a root needs, each after those it imports.
@@ -66,8 +82,20 @@ impl Graph {
         }
         let mut graph = loader.graph;
         graph.check_imported_names();
-        graph.check_duplicates();
+        let mut faults = scope::resolve(&mut graph);
+        graph.diagnostics.append(&mut faults);
         graph
+    }
+
+    /// All that a module imports, directly or not, each after those it imports itself.
+    pub fn imports_of(&self, index: usize) -> Vec<usize> {
+        let mut needed = BTreeSet::new();
+        let mut open = vec![index];
+        while let Some(module) = open.pop() {
+            let targets = self.modules[module].targets.iter();
+            open.extend(targets.filter(|target| needed.insert(**target)));
+        }
+        self.order.iter().copied().filter(|module| *module != index && needed.contains(module)).collect()
     }
 
     /// `imported by …` from module `index` up to the root.
@@ -94,11 +122,17 @@ impl Graph {
     fn check_imported_names(&mut self) {
         let mut found = Vec::new();
         for (index, module) in self.modules.iter().enumerate() {
-            for (import, target) in module.outline.imports.iter().zip(&module.targets) {
-                let Some(target) = target else { continue };
-                for item in &import.items {
-                    found.extend(self.check_imported_name(index, *target, item));
-                }
+            for item in module.outline.imports.iter().flat_map(|import| &import.items) {
+                let Some((target, _)) = module.names.get(&item.local().name) else { continue };
+                found.extend(self.check_imported_name(index, *target, &item.name));
+            }
+            for qualified in &module.outline.qualified {
+                let target = module.paths.iter().find(|(range, _)| *range == qualified.range);
+                found.extend(
+                    target.and_then(|(_, (target, _))| {
+                        self.check_imported_name(index, *target, &qualified.name)
+                    }),
+                );
             }
         }
         self.diagnostics.append(&mut found);
@@ -106,7 +140,7 @@ impl Graph {
 
     fn check_imported_name(&self, importer: usize, target: usize, item: &Name) -> Option<Diagnostic> {
         let module = &self.modules[target];
-        if module.outline.declarations.iter().any(|name| name.name == item.name) {
+        if module.outline.declarations.iter().any(|declaration| declaration.name.name == item.name) {
             return None;
         }
         let message = format!("module `{}` does not declare `{}`", module.path, item.name);
@@ -117,30 +151,11 @@ impl Graph {
                 item.name
             )));
         }
-        let names = module.outline.declarations.iter().map(|name| name.name.as_str());
+        let names = module.outline.declarations.iter().map(|declaration| declaration.name.name.as_str());
         Some(match suggest::closest(&item.name, names) {
             Some(name) => diagnostic.with_help(format!("did you mean `{name}`?")),
             None => diagnostic,
         })
-    }
-
-    fn check_duplicates(&mut self) {
-        let mut first: BTreeMap<&str, (usize, &Name)> = BTreeMap::new();
-        let mut found = Vec::new();
-        for (index, module) in self.modules.iter().enumerate() {
-            for name in &module.outline.declarations {
-                let Some((other, earlier)) = first.get(name.name.as_str()) else {
-                    first.insert(&name.name, (index, name));
-                    continue;
-                };
-                let other = &self.modules[*other];
-                let place = Span::new(&other.text, earlier.range.clone());
-                let message = format!("`{}` is declared twice", name.name);
-                let note = format!("first declared at {}:{}:{}", other.path, place.line, place.column);
-                found.push(self.error_at(index, name.range.clone(), message).with_note(note));
-            }
-        }
-        self.diagnostics.append(&mut found);
     }
 }
 
@@ -188,16 +203,15 @@ impl Loader<'_, '_> {
     ) -> usize {
         let index = self.graph.modules.len();
         self.known.insert(path.to_owned(), Known::Module(index));
-        let outline = Outline::default();
-        let (path, hidden) = (path.to_owned(), BTreeSet::new());
-        let module =
-            Module { path, text, outline, hidden, cuts: Vec::new(), targets: Vec::new(), imported_by };
+        let module = Module { path: path.to_owned(), text, imported_by, ..Module::default() };
         self.graph.modules.push(module);
         self.outline(index);
         self.stack.push(index);
         for import in self.graph.modules[index].outline.imports.clone() {
-            let target = self.import(index, &import);
-            self.graph.modules[index].targets.push(target);
+            self.import(index, &import);
+        }
+        for qualified in self.graph.modules[index].outline.qualified.clone() {
+            self.resolve_qualified(index, &qualified);
         }
         self.stack.pop();
         self.graph.order.push(index);
@@ -243,79 +257,122 @@ impl Loader<'_, '_> {
         Ok(tokens)
     }
 
-    /// Finds and loads the module that `import` of module `importer` names.
-    fn import(&mut self, importer: usize, import: &Import) -> Option<usize> {
-        let path = self.graph.modules[importer].path.clone();
-        let Some(candidates) = resolve::candidates(&path, &import.path) else {
-            let message = format!("`{}` names no module inside the project", import.path.join("::"));
-            self.push_error(importer, import, message, None, None);
-            return None;
-        };
-        for candidate in &candidates {
-            match self.look_up(candidate) {
-                Known::Missing => {}
-                Known::Text(text) => return self.load_limited(importer, import, candidate, text),
-                Known::Module(index) => {
-                    self.check_cycle(importer, import, index);
-                    return Some(index);
+    /// Finds and loads what `import` of module `importer` names: a module that has the items, or modules called like them.
+    fn import(&mut self, importer: usize, import: &Import) {
+        match self.find(importer, &import.path, &import.path_range) {
+            Found::Module(target) => {
+                for item in &import.items {
+                    let (local, meaning) = (item.local(), (target, item.name.name.clone()));
+                    let known =
+                        self.graph.modules[importer].names.insert(local.name.clone(), meaning.clone());
+                    if known.is_some_and(|known| known != meaning) {
+                        let message = format!("`{}` is imported from two modules", local.name);
+                        let help = format!("call one of them something else: `{} as …`", item.name.name);
+                        self.refuse(importer, &local.range, message, Some(help));
+                    }
+                }
+            }
+            Found::Refused => {}
+            Found::Nowhere(searched) => {
+                for item in &import.items {
+                    let mut path = import.path.clone();
+                    path.push(item.name.name.clone());
+                    let range = import.path_range.start..item.name.range.end;
+                    if let Found::Module(target) = self.find(importer, &path, &range) {
+                        self.graph.modules[importer].namespaces.insert(item.local().name.clone(), target);
+                    } else {
+                        return self.push_missing(importer, &import.path, &import.path_range, &searched);
+                    }
                 }
             }
         }
-        let message = format!("module `{}` was not found", import.path.join("::"));
-        let note = format!("searched: {}", candidates.join(", "));
-        let help = self.help_for_missing(&path, import);
-        self.push_error(importer, import, message, Some(note), Some(help));
-        None
     }
 
-    fn load_limited(
-        &mut self,
-        importer: usize,
-        import: &Import,
-        path: &str,
-        text: Arc<str>,
-    ) -> Option<usize> {
-        if self.graph.modules.len() >= limits::MODULE_COUNT_MAX {
-            let message = format!("more than {} modules are imported", limits::MODULE_COUNT_MAX);
-            self.push_error(importer, import, message, None, None);
-            return None;
+    /// Finds and loads the module of a name with a path.
+    fn resolve_qualified(&mut self, importer: usize, qualified: &QualifiedName) {
+        let QualifiedName { path, name, range } = qualified;
+        let namespace = self.graph.modules[importer].namespaces.get(&path[0]).copied();
+        let path_range = range.start..name.range.start.saturating_sub(2).max(range.start + 1);
+        let found = match namespace.filter(|_| path.len() == 1) {
+            Some(target) => Found::Module(target),
+            None => self.find(importer, path, &path_range),
+        };
+        match found {
+            Found::Module(target) => {
+                let meaning = (target, name.name.clone());
+                self.graph.modules[importer].paths.push((range.clone(), meaning));
+            }
+            Found::Refused => {}
+            Found::Nowhere(searched) => self.push_missing(importer, path, &path_range, &searched),
         }
-        Some(self.load_module(path, text, Some((importer, import.range.clone()))))
     }
 
-    fn check_cycle(&mut self, importer: usize, import: &Import, target: usize) {
+    /// The module at a path, as seen from `importer`, where the path stands at `range`.
+    fn find(&mut self, importer: usize, path: &[String], range: &Range<usize>) -> Found {
+        let from = self.graph.modules[importer].path.clone();
+        let Some(candidates) = resolve::candidates(&from, path) else {
+            let message = format!("`{}` names no module inside the project", path.join("::"));
+            return self.refuse(importer, range, message, None);
+        };
+        for candidate in &candidates {
+            let target = match self.look_up(candidate) {
+                Known::Missing => continue,
+                Known::Text(_) if self.graph.modules.len() >= limits::MODULE_COUNT_MAX => {
+                    let message = format!("more than {} modules are imported", limits::MODULE_COUNT_MAX);
+                    return self.refuse(importer, range, message, None);
+                }
+                Known::Text(text) => self.load_module(candidate, text, Some((importer, range.clone()))),
+                Known::Module(index) => {
+                    self.check_cycle(importer, range, index);
+                    index
+                }
+            };
+            let targets = &mut self.graph.modules[importer].targets;
+            if !targets.contains(&target) {
+                targets.push(target);
+            }
+            return Found::Module(target);
+        }
+        Found::Nowhere(candidates)
+    }
+
+    fn check_cycle(&mut self, importer: usize, range: &Range<usize>, target: usize) {
         let Some(start) = self.stack.iter().position(|index| *index == target) else { return };
         let chain = self.stack[start..].iter().chain([&target]);
         let paths: Vec<&str> = chain.map(|index| self.graph.modules[*index].path.as_str()).collect();
         let message = format!("modules import each other: {}", paths.join(" → "));
         let help = "move what both need into a third module".to_owned();
-        self.push_error(importer, import, message, None, Some(help));
+        self.refuse(importer, range, message, Some(help));
     }
 
-    /// `import lib::brdf;` is a likely slip for `import lib::brdf::{…};`.
-    fn help_for_missing(&mut self, importer: &str, import: &Import) -> String {
-        let mut longer = import.path.clone();
-        longer.extend(import.items.first().map(|item| item.name.clone()));
-        let files = resolve::candidates(importer, &longer).unwrap_or_default();
-        if files.iter().any(|file| !matches!(self.look_up(file), Known::Missing)) {
-            return format!("name what you import: `import {}::{{…}};`", longer.join("::"));
-        }
-        "create one of these, or correct the import".to_owned()
+    fn push_missing(&mut self, importer: usize, path: &[String], range: &Range<usize>, searched: &[String]) {
+        let message = format!("module `{}` was not found", path.join("::"));
+        let mut diagnostic = self.graph.error_at(importer, range.clone(), message);
+        diagnostic.notes.insert(0, format!("searched: {}", searched.join(", ")));
+        self.graph.diagnostics.push(diagnostic.with_help("create one of these, or correct the path"));
     }
 
-    fn push_error(
+    fn refuse(
         &mut self,
         importer: usize,
-        import: &Import,
+        range: &Range<usize>,
         message: String,
-        note: Option<String>,
         help: Option<String>,
-    ) {
-        let mut diagnostic = self.graph.error_at(importer, import.path_range.clone(), message);
-        diagnostic.notes.splice(0..0, note);
+    ) -> Found {
+        let mut diagnostic = self.graph.error_at(importer, range.clone(), message);
         diagnostic.help = help;
         self.graph.diagnostics.push(diagnostic);
+        Found::Refused
     }
+}
+
+/// What looking for a module gave.
+enum Found {
+    Module(usize),
+    /// No file; these were looked for.
+    Nowhere(Vec<String>),
+    /// It was said why.
+    Refused,
 }
 
 /// Names that the module declares under other features only.
@@ -324,7 +381,8 @@ fn hidden_names(path: &str, text: &str, tokens: &[token::Token], kept: &Outline)
     let mut ignored = Vec::new();
     let all = condition::decide(path, text, tokens, Mode::Everything, &mut ignored);
     let outline = module::outline(path, text, &all.kept, &mut ignored);
-    let visible: BTreeSet<&str> = kept.declarations.iter().map(|name| name.name.as_str()).collect();
-    let names = outline.declarations.into_iter().map(|name| name.name);
+    let visible: BTreeSet<&str> =
+        kept.declarations.iter().map(|declaration| declaration.name.name.as_str()).collect();
+    let names = outline.declarations.into_iter().map(|declaration| declaration.name.name);
     names.filter(|name| !visible.contains(name.as_str())).collect()
 }

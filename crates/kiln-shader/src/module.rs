@@ -15,7 +15,23 @@ pub struct Name {
     pub range: Range<usize>,
 }
 
-/// `import a::b::{x, y};`
+/// What an import takes from a module: `x`, or `x as y`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Item {
+    /// Its name there.
+    pub name: Name,
+    /// Its name here, if that is another.
+    pub alias: Option<Name>,
+}
+
+impl Item {
+    /// Its name in the importing module.
+    pub fn local(&self) -> &Name {
+        self.alias.as_ref().unwrap_or(&self.name)
+    }
+}
+
+/// `import a::b::{x, y as z};`, or a part of `import a::{b::x, c::y};`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Import {
     /// Module path, as `["lib", "brdf"]`; may start with `package` or `super`.
@@ -23,9 +39,27 @@ pub struct Import {
     /// Bytes of the path.
     pub path_range: Range<usize>,
     /// What is imported from it.
-    pub items: Vec<Name>,
-    /// Bytes of the whole statement.
+    pub items: Vec<Item>,
+}
+
+/// `a::b::x` where a name stands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct QualifiedName {
+    /// The module, as in an import; may start with the name of an imported module.
+    pub path: Vec<String>,
+    /// What is meant there.
+    pub name: Name,
+    /// Bytes of all of it.
     pub range: Range<usize>,
+}
+
+/// A name declared at module scope.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Declaration {
+    /// The name.
+    pub name: Name,
+    /// Whether something outside knows it by this name: entry points, variables and overrides.
+    pub is_public: bool,
 }
 
 /// What the linker needs to know of a module.
@@ -33,10 +67,14 @@ pub struct Import {
 pub struct Outline {
     /// Imports in source order.
     pub imports: Vec<Import>,
+    /// Bytes of their statements.
+    pub import_statements: Vec<Range<usize>>,
+    /// Names with a path, in source order.
+    pub qualified: Vec<QualifiedName>,
     /// `enable`, `requires` and `diagnostic` directives: linked text must start with them.
     pub directives: Vec<Range<usize>>,
     /// Names declared at module scope, in source order.
-    pub declarations: Vec<Name>,
+    pub declarations: Vec<Declaration>,
 }
 
 /// Outlines a module from the tokens that its conditions keep. What it does not understand it leaves to
@@ -46,11 +84,14 @@ pub fn outline(file: &str, text: &str, tokens: &[Token], diagnostics: &mut Vec<D
     let mut outline = Outline::default();
     let mut declared_before = false;
     while parser.at < tokens.len() {
-        parser.skip_attributes();
+        let is_entry_point = parser.skip_attributes();
         let start = parser.at;
         match parser.word() {
             Some("import") => match parser.import(declared_before) {
-                Ok(import) => outline.imports.push(import),
+                Ok(imports) => {
+                    outline.imports.extend(imports);
+                    outline.import_statements.push(parser.bytes_since(start));
+                }
                 Err(diagnostic) => {
                     diagnostics.push(*diagnostic);
                     parser.at = start;
@@ -63,8 +104,11 @@ pub fn outline(file: &str, text: &str, tokens: &[Token], diagnostics: &mut Vec<D
             }
             Some(keyword) => {
                 declared_before = true;
-                outline.declarations.extend(parser.declared_name(keyword));
+                let is_public = is_entry_point || ["var", "override"].contains(&keyword);
+                let declared = parser.declared_name(keyword);
+                outline.declarations.extend(declared.map(|name| Declaration { name, is_public }));
                 parser.skip_declaration();
+                parser.collect_qualified(start, &mut outline.qualified);
             }
             None => parser.at += 1,
         }
@@ -118,13 +162,43 @@ impl<'a> Parser<'a> {
         self.at += 1;
     }
 
-    /// Skips `@name` and `@name(…)`.
-    fn skip_attributes(&mut self) {
+    /// Skips `@name` and `@name(…)`. Whether one of them makes an entry point.
+    fn skip_attributes(&mut self) -> bool {
+        let mut is_entry_point = false;
         while self.is('@') {
+            let name = self.word_at(self.at + 1);
+            is_entry_point |= name.is_some_and(|name| ["vertex", "fragment", "compute"].contains(&name));
             self.at += 2;
             if self.is('(') {
                 self.skip_brackets();
             }
+        }
+        is_entry_point
+    }
+
+    /// Finds `a::b::x` from the token `start` to the present one.
+    fn collect_qualified(&self, start: usize, found: &mut Vec<QualifiedName>) {
+        let end = self.at.min(self.tokens.len());
+        let is_separator = |at: usize| {
+            at + 1 < end
+                && self.tokens[at].is(':')
+                && self.tokens[at + 1].is(':')
+                && self.tokens[at].end == self.tokens[at + 1].start
+        };
+        let mut at = start;
+        while at < end {
+            let first = at;
+            let mut path = Vec::new();
+            while let Some(word) = self.word_at(at).filter(|_| at < end && is_separator(at + 1)) {
+                path.push(word.to_owned());
+                at += 3;
+            }
+            if let Some(name) = self.word_at(at).filter(|_| !path.is_empty() && at < end) {
+                let range = self.tokens[at].range();
+                let whole = self.tokens[first].start..range.end;
+                found.push(QualifiedName { path, name: Name { name: name.to_owned(), range }, range: whole });
+            }
+            at += 1;
         }
     }
 
@@ -177,40 +251,85 @@ impl<'a> Parser<'a> {
         rest.iter().position(|token| token.is('>')).map_or(at, |len| at + len + 1)
     }
 
-    fn import(&mut self, declared_before: bool) -> Result<Import, Fault> {
-        let start = self.at;
+    /// One import for each module that the statement names.
+    fn import(&mut self, declared_before: bool) -> Result<Vec<Import>, Fault> {
         if declared_before {
             return Err(self.fault("imports stand before all declarations"));
         }
         self.at += 1;
-        let mut path = vec![self.name("a module path")?];
-        let mut items = Vec::new();
-        while self.is_path_separator() {
-            self.at += 2;
-            if self.is('{') {
-                items = self.import_list()?;
-                break;
-            }
-            path.push(self.name("a name or `{`")?);
-        }
-        if items.is_empty() {
-            items.extend(path.pop());
-        }
-        self.refuse_rename()?;
+        let mut imports = Vec::new();
+        self.import_tree(&mut Vec::new(), &mut imports)?;
         if !self.is(';') {
             return Err(self.fault("expected `;` after an import"));
         }
         self.at += 1;
+        Ok(imports)
+    }
+
+    /// `a::b::x`, `a::b::x as y` or `a::b::{…}` below `prefix`. Brackets are bounded by `limits`.
+    fn import_tree(&mut self, prefix: &mut Vec<Name>, imports: &mut Vec<Import>) -> Result<(), Fault> {
+        let depth = prefix.len();
+        let name = self.name("a module path")?;
+        prefix.push(name);
+        while self.is_path_separator() {
+            self.at += 2;
+            if self.is('{') {
+                self.import_list(prefix, imports)?;
+                prefix.truncate(depth);
+                return Ok(());
+            }
+            let name = self.name("a name or `{`")?;
+            prefix.push(name);
+        }
+        let alias = self.alias()?;
+        let Some(name) = prefix.pop() else { return Ok(()) };
+        self.push_item(prefix, Item { name, alias }, imports)?;
+        prefix.truncate(depth);
+        Ok(())
+    }
+
+    fn import_list(&mut self, prefix: &mut Vec<Name>, imports: &mut Vec<Import>) -> Result<(), Fault> {
+        self.at += 1;
+        if self.is('}') {
+            return Err(self.fault("this import takes nothing"));
+        }
+        while !self.is('}') {
+            self.import_tree(prefix, imports)?;
+            if self.is(',') {
+                self.at += 1;
+            } else if !self.is('}') {
+                return Err(self.fault("expected `,` or `}` in an import"));
+            }
+        }
+        self.at += 1;
+        Ok(())
+    }
+
+    fn alias(&mut self) -> Result<Option<Name>, Fault> {
+        if self.word() != Some("as") {
+            return Ok(None);
+        }
+        self.at += 1;
+        self.name("a new name").map(Some)
+    }
+
+    fn push_item(&self, path: &[Name], item: Item, imports: &mut Vec<Import>) -> Result<(), Fault> {
         let (Some(first), Some(last)) = (path.first(), path.last()) else {
-            self.at = start + 1;
-            let fault = self.fault("an import names a module and what it takes from it");
+            let range = item.name.range;
+            let fault = Diagnostic::error("an import names a module and what it takes from it");
             return Err(Box::new(
-                fault.with_help("write `import module::name;` or `import module::{a, b};`"),
+                fault
+                    .at(self.file, self.text, range)
+                    .with_help("write `import module::name;` or `import module::{a, b};`"),
             ));
         };
         let path_range = first.range.start..last.range.end;
-        let path = path.into_iter().map(|name| name.name).collect();
-        Ok(Import { path, path_range, items, range: self.bytes_since(start) })
+        let path: Vec<String> = path.iter().map(|name| name.name.clone()).collect();
+        match imports.last_mut().filter(|import| import.path == path) {
+            Some(import) => import.items.push(item),
+            None => imports.push(Import { path, path_range, items: vec![item] }),
+        }
+        Ok(())
     }
 
     fn name(&mut self, what: &str) -> Result<Name, Fault> {
@@ -218,36 +337,5 @@ impl<'a> Parser<'a> {
         let range = self.tokens[self.at].range();
         self.at += 1;
         Ok(Name { name, range })
-    }
-
-    fn import_list(&mut self) -> Result<Vec<Name>, Fault> {
-        self.at += 1;
-        let mut items = Vec::new();
-        while !self.is('}') {
-            items.push(self.name("a name")?);
-            self.refuse_rename()?;
-            if self.is_path_separator() {
-                let fault = self.fault("nested imports are not supported");
-                return Err(Box::new(fault.with_help("write one `import` per module")));
-            }
-            if self.is(',') {
-                self.at += 1;
-            } else if !self.is('}') {
-                return Err(self.fault("expected `,` or `}` in an import"));
-            }
-        }
-        if items.is_empty() {
-            return Err(self.fault("this import takes nothing"));
-        }
-        self.at += 1;
-        Ok(items)
-    }
-
-    fn refuse_rename(&self) -> Result<(), Fault> {
-        if self.word() != Some("as") {
-            return Ok(());
-        }
-        let fault = self.fault("`as` is not supported: names stay as they are");
-        Err(Box::new(fault.with_help("rename the declaration itself")))
     }
 }

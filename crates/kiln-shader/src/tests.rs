@@ -3,12 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use crate::{Compiled, Outcome, compile};
+use crate::{Compiled, Outcome, Program, compile};
 
 mod canonical;
 mod conditions;
 mod diagnostics;
 mod hostile;
+mod imports;
 mod shaders;
 
 /// A project in memory.
@@ -20,7 +21,7 @@ impl Files {
     }
 
     fn compile(&self, root: &str, features: &[&str]) -> Outcome {
-        compile(root, &set(features), &mut |path| self.0.get(path).cloned())
+        compile(&Program::of(root), &set(features), &mut |path| self.0.get(path).cloned())
     }
 }
 

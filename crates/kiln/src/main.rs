@@ -27,7 +27,15 @@ pub(crate) const INPUT_IS_WRONG: u8 = 1;
 /// The tool could not do its work.
 pub(crate) const TOOL_FAILED: u8 = 2;
 
+/// How this program is started to compile shaders for another of its kind.
+const WORKER: &str = "shader-worker";
+
 fn main() -> ExitCode {
+    if std::env::args_os().nth(1).is_some_and(|first| first == WORKER) {
+        // Whoever started it reads how it ended.
+        return if kiln_worker::serve().is_ok() { ExitCode::SUCCESS } else { ExitCode::from(TOOL_FAILED) };
+    }
+    kiln_worker::use_program(place::this_program(), &[WORKER]);
     let args = match args::Args::try_parse() {
         Ok(args) => args,
         Err(asked) => {

@@ -21,6 +21,12 @@ pub(crate) fn cache_folder() -> anyhow::Result<PathBuf> {
     Ok(variable("XDG_CACHE_HOME").filter(|path| path.is_absolute()).unwrap_or(default).join("kiln"))
 }
 
+/// This program, for starting it again. On Linux that works when the file was replaced, as by a build.
+pub(crate) fn this_program() -> PathBuf {
+    let own = Path::new("/proc/self/exe");
+    if own.exists() { own.to_owned() } else { std::env::current_exe().unwrap_or_else(|_| "kiln".into()) }
+}
+
 /// Worker threads: as asked, else one for each core.
 pub(crate) fn jobs(asked: Option<usize>) -> usize {
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);

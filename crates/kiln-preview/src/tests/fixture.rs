@@ -93,7 +93,7 @@ impl Build {
         read: &mut dyn FnMut(&str) -> Option<Arc<str>>,
     ) -> &mut Self {
         let set: BTreeSet<String> = features.iter().map(|feature| (*feature).to_owned()).collect();
-        let outcome = kiln_shader::compile(root, &set, read);
+        let outcome = kiln_shader::compile(&kiln_shader::Program::of(root), &set, read);
         let compiled = outcome.compiled.unwrap_or_else(|| panic!("{root}: {:?}", outcome.diagnostics));
         let variant = if features.is_empty() { "base".to_owned() } else { features.join("+") };
         let reflection = serde_json::to_vec(&compiled.reflection).expect("a reflection is plain data");

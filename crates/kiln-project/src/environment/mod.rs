@@ -55,7 +55,7 @@ pub(crate) fn plan_environment(planner: &mut Planner, engine: &Engine, name: &st
         output: LEVEL.to_owned(),
         part: format!("mip{level}"),
     };
-    planner.target(target("skybox"), "cube", json!({}), vec![PartSpec::Levels(skybox)]);
+    planner.target(target("skybox"), "cube", json!({}), vec![PartSpec::Folder(skybox, LEVELS)]);
     planner.target(target("sh"), "sh", json!({"order": env.sh_order}), vec![PartSpec::one(sh, "json")]);
     if env.is_sun_extracted {
         let sun = PartSpec::One { action: decode, output: "sun".to_owned(), part: "json".to_owned() };

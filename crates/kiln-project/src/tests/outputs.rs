@@ -181,8 +181,8 @@ fn every_flipped_bit_in_the_store_is_healed_by_the_next_build_and_write() {
 fn folder_of_maps_is_written_by_one_at_a_time() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("maps");
-    let lock = crate::lock_folder(&out).expect("locked");
-    let is_free = || std::fs::File::open(&out).expect("made by the lock").try_lock().is_ok();
+    let lock = lock_folder(&out).expect("locked");
+    let is_free = || fs::File::open(&out).expect("made by the lock").try_lock().is_ok();
     assert!(!is_free(), "a second writer would mix its files with ours");
     drop(lock);
     assert!(is_free());

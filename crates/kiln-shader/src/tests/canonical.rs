@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::{Files, compiled};
-use crate::{BindingKind, Compiled, Stage};
+use crate::{BindingKind, Compiled, Program, Stage};
 
 #[track_caller]
 fn compile_one(text: &str) -> Compiled {
@@ -28,6 +28,48 @@ fn comments_space_and_unused_items_do_not_change_it() {
         return tint*x; // end";
     let other = format!("\u{feff}{other}\n}}");
     assert_eq!(compile_one(PLAIN), compile_one(&other));
+}
+
+#[test]
+fn renamed_locals_do_not_change_it() {
+    let text = "fn scaled(gain: f32) -> f32 { var sum = gain; let twice = sum * 2.0; sum += twice; return sum; }
+        @fragment fn fs_main(@location(0) x: f32) -> @location(0) vec4f { let y = scaled(x); return vec4f(y); }";
+    let mut other = text.to_owned();
+    for (name, renamed) in [("gain", "g0"), ("sum", "scaled_"), ("twice", "value"), ("y", "variable_1")] {
+        other = other.replace(name, renamed);
+    }
+    assert_eq!(compile_one(text), compile_one(&other));
+    assert_ne!(compile_one(text).wgsl, compile_one(&text.replace("sum += twice", "sum -= twice")).wgsl);
+}
+
+#[test]
+fn source_map_has_the_authors_names_and_lines() {
+    let files = Files::new(&[
+        (
+            "a.wgsl",
+            "import b::half;\n\n@fragment fn fs_main(@location(0) shade: f32) -> @location(0) vec4f {\n return vec4f(half(shade)); }",
+        ),
+        ("b.wgsl", "// halves\nfn half(whole: f32) -> f32 { var part = whole; part *= 0.5; return part; }"),
+    ]);
+    let outcome = files.compile("a.wgsl", &[]);
+    let found: Vec<_> = outcome
+        .source_map
+        .functions
+        .iter()
+        .map(|function| {
+            let locals: Vec<_> = function.locals.iter().map(|(a, b)| (a.as_str(), b.as_str())).collect();
+            (function.source_name.as_str(), function.file.as_str(), function.line, locals)
+        })
+        .collect();
+    assert_eq!(
+        found,
+        [
+            ("half", "b.wgsl", 2, vec![("argument_1", "whole"), ("variable", "part")]),
+            ("fs_main", "a.wgsl", 4, vec![("argument", "shade")]),
+        ]
+    );
+    let text = compiled(outcome).wgsl;
+    assert!(text.contains("fn half(argument_1: f32)") && text.contains("var variable: f32"), "{text}");
 }
 
 #[test]
@@ -177,7 +219,7 @@ fn each_file_is_read_once_and_missing_candidates_are_dependencies() {
         ("lib/c.wgsl", "fn g() -> f32 { return 1.0; }"),
     ]);
     let mut read = Vec::new();
-    let outcome = crate::compile("s/pbr/a.wgsl", &BTreeSet::new(), &mut |path| {
+    let outcome = crate::compile(&Program::of("s/pbr/a.wgsl"), &BTreeSet::new(), &mut |path| {
         read.push(path.to_owned());
         files.0.get(path).cloned()
     });

@@ -210,23 +210,26 @@ fn missing_module_lists_where_it_was_searched() {
 1 | import lib::b::f;
   |        ^^^^^^
   note: searched: shaders/pbr/lib/b.wgsl, shaders/lib/b.wgsl, lib/b.wgsl
-  help: create one of these, or correct the import"
+  help: create one of these, or correct the path"
     );
 }
 
 #[test]
-fn import_of_a_whole_module_shows_the_right_form() {
+fn missing_module_of_a_name_with_a_path_is_shown_there() {
     check(
-        &[("a.wgsl", "import lib::b;"), ("lib/b.wgsl", "")],
+        &[
+            ("a.wgsl", "import lib::b;\nfn f() -> f32 { return b::x + lib::c::y; }"),
+            ("lib/b.wgsl", "const x = 1.0;"),
+        ],
         &[],
         "
-error: module `lib` was not found
-  --> a.wgsl:1:8
+error: module `lib::c` was not found
+  --> a.wgsl:2:31
   |
-1 | import lib::b;
-  |        ^^^
-  note: searched: lib.wgsl
-  help: name what you import: `import lib::b::{…};`
+2 | fn f() -> f32 { return b::x + lib::c::y; }
+  |                               ^^^^^^
+  note: searched: lib/c.wgsl
+  help: create one of these, or correct the path
 ",
     );
 }
@@ -260,22 +263,22 @@ fn import_of_itself_is_a_cycle() {
 }
 
 #[test]
-fn name_declared_in_two_modules_names_both() {
+fn variable_declared_in_two_modules_names_both() {
     check(
         &[
             ("a.wgsl", "import b::f;\nimport c::g;\n"),
-            ("b.wgsl", "fn f() {}\nconst PI = 3.14;"),
-            ("c.wgsl", "fn g() {}\n\nconst PI = 3.1;"),
+            ("b.wgsl", "fn f() {}\nvar<private> PI: f32;"),
+            ("c.wgsl", "fn g() {}\n\nvar<private> PI: f32;"),
         ],
         &[],
         "
 error: `PI` is declared twice
-  --> c.wgsl:3:7
+  --> c.wgsl:3:14
   |
-3 | const PI = 3.1;
-  |       ^^
+3 | var<private> PI: f32;
+  |              ^^
   note: imported by a.wgsl:2
-  note: first declared at b.wgsl:2:7
+  note: first declared at b.wgsl:2:14
 ",
     );
 }
@@ -356,9 +359,11 @@ error: this shader has no entry point
 #[test]
 fn import_syntax_faults_say_what_to_write() {
     let cases = [
-        ("import b::f as g;", "`as` is not supported: names stay as they are"),
-        ("import b::{f as g};", "`as` is not supported: names stay as they are"),
-        ("import b::{c::f};", "nested imports are not supported"),
+        ("import b::f as ;", "expected a new name in an import"),
+        ("import b::{f as g, g as g};", "`g` is imported from two modules"),
+        ("import b::{c::f};", "module `b::c` was not found"),
+        ("import b::f;\nfn f() {}", "`f` is declared twice"),
+        ("import b::{f, g,,};", "expected a module path in an import"),
         ("import b;", "an import names a module and what it takes from it"),
         ("import b::{};", "this import takes nothing"),
         ("import b::f", "expected `;` after an import"),
@@ -372,4 +377,28 @@ fn import_syntax_faults_say_what_to_write() {
         let message = outcome.diagnostics.first().map(|diagnostic| diagnostic.message.as_str());
         assert_eq!(message, Some(expected), "for {text:?}");
     }
+}
+
+#[test]
+fn first_fault_of_every_module_is_reported() {
+    let files = Files::new(&[
+        (
+            "a.wgsl",
+            "import b::f;\nimport c::g;\n@fragment fn fs_main() -> @location(0) vec4f { return vec3f(f() + g()); }",
+        ),
+        ("b.wgsl", "fn f() -> f32 { return missing; }\nfn also() -> f32 { return gone; }"),
+        ("c.wgsl", "import d::h;\nfn g() -> f32 { return h() + true; }"),
+        ("d.wgsl", "fn h() -> f32 { return 1.0; }"),
+        ("e.wgsl", "import d::h;\n@fragment fn fs_main() -> @location(0) vec4f { return vec3f(h()); }"),
+    ]);
+    let places = |root: &str| -> Vec<(String, u32)> {
+        let outcome = files.compile(root, &[]);
+        assert!(outcome.compiled.is_none());
+        let diagnostics = outcome.diagnostics.into_iter();
+        diagnostics.map(|found| (found.file.unwrap(), found.span.unwrap().line)).collect()
+    };
+    let place = |file: &str, line: u32| (file.to_owned(), line);
+    // What a.wgsl itself has wrong depends on what the broken modules would have declared.
+    assert_eq!(places("a.wgsl"), [place("b.wgsl", 1), place("c.wgsl", 2)]);
+    assert_eq!(places("e.wgsl"), [place("e.wgsl", 2)]);
 }

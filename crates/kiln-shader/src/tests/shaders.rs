@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::{Files, compiled, set};
-use crate::{BindingKind, Compiled, Reflection, scan_dependencies};
+use crate::{BindingKind, Compiled, Program, Reflection, scan};
 
 const FEATURES: [&str; 11] = [
     "alpha_blend",
@@ -189,7 +189,8 @@ fn feature_sets_that_agree_on_named_features_compile_to_the_same() {
 #[test]
 fn scan_finds_files_that_only_some_features_import() {
     let files = shipped();
-    let scanned = scan_dependencies("shaders/pbr/pbr.wgsl", &mut |path| files.0.get(path).cloned());
+    let scanned =
+        scan(&Program::of("shaders/pbr/pbr.wgsl"), &mut |path| files.0.get(path).cloned()).dependencies;
     let found: BTreeSet<&str> = scanned
         .iter()
         .filter(|dependency| dependency.found)

@@ -1,0 +1,50 @@
+//! What a worker is asked, and what it answers.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use kiln_shader::{Outcome, Program};
+use serde::{Deserialize, Serialize};
+
+/// A shader's files: the text of each, by its path relative to the project; those that are missing too.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Sources(pub BTreeMap<String, Option<Arc<str>>>);
+
+impl Sources {
+    /// A file's text; `None` if it is missing or was not given.
+    pub fn read(&self, path: &str) -> Option<Arc<str>> {
+        self.0.get(path).cloned().flatten()
+    }
+}
+
+/// Work for a worker.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Task {
+    /// [`kiln_shader::compile`].
+    Compile {
+        /// The shader.
+        program: Program,
+        /// Features that hold.
+        features: BTreeSet<String>,
+        /// All it may import.
+        sources: Sources,
+    },
+}
+
+/// What came of a task, in the same order.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Reply {
+    /// Of [`Task::Compile`].
+    Compiled(Outcome),
+}
+
+impl Task {
+    /// Does the work here and now.
+    pub fn perform(&self) -> Reply {
+        match self {
+            Task::Compile { program, features, sources } => {
+                Reply::Compiled(kiln_shader::compile(program, features, &mut |path| sources.read(path)))
+            }
+        }
+    }
+}
