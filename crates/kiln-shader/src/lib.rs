@@ -13,12 +13,14 @@ use std::collections::BTreeSet;
 
 use kiln_diagnostic::Diagnostic;
 
+pub use emit::*;
 pub use link::Read;
 pub use reflect::*;
 
 mod canonical;
 mod condition;
 mod describe;
+mod emit;
 mod explain;
 mod front;
 mod interface;

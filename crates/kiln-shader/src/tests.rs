@@ -8,6 +8,7 @@ use crate::{Compiled, Outcome, compile};
 mod canonical;
 mod conditions;
 mod diagnostics;
+mod emit;
 mod hostile;
 mod shaders;
 
