@@ -48,28 +48,34 @@ pub struct LinkedShader {
 
 /// Parses, validates, compacts, emits and reflects.
 pub fn compile_linked(text: &str) -> Result<LinkedShader, Fault> {
-    on_deep_stack(text, compile)
+    check_length(text)?;
+    on_deep_stack(Fault::Internal, || compile(text))
 }
 
 /// Parses and validates only; a text without entry points is fine.
 pub fn check_linked(text: &str) -> Result<(), Fault> {
-    on_deep_stack(text, |text| parse(text).map(drop))
+    check_length(text)?;
+    on_deep_stack(Fault::Internal, || parse(text).map(drop))
 }
 
-fn on_deep_stack<T: Send>(
-    text: &str,
-    work: impl FnOnce(&str) -> Result<T, Fault> + Send,
-) -> Result<T, Fault> {
+fn check_length(text: &str) -> Result<(), Fault> {
     if text.len() > limits::LINKED_BYTES_MAX {
         return Err(Fault::TooLong { limit: limits::LINKED_BYTES_MAX, actual: text.len() });
     }
+    Ok(())
+}
+
+/// Runs `work` with a stack that naga's recursion fits in. A panic in it becomes the error `internal`.
+pub fn on_deep_stack<T: Send, E: Send>(
+    internal: fn(String) -> E,
+    work: impl FnOnce() -> Result<T, E> + Send,
+) -> Result<T, E> {
     std::thread::scope(|scope| {
         let builder = std::thread::Builder::new().name("kiln-shader".to_owned()).stack_size(STACK_BYTES);
-        let worker = builder
-            .spawn_scoped(scope, || work(text))
-            .map_err(|error| Fault::Internal(format!("no thread: {error}")))?;
+        let worker =
+            builder.spawn_scoped(scope, work).map_err(|error| internal(format!("no thread: {error}")))?;
         // naga panics on some hostile input (gfx-rs/wgpu #9499, #7687): that ends this thread only.
-        worker.join().unwrap_or_else(|panic| Err(Fault::Internal(panic_text(panic.as_ref()))))
+        worker.join().unwrap_or_else(|panic| Err(internal(panic_text(panic.as_ref()))))
     })
 }
 
@@ -106,7 +112,8 @@ fn reparse_fault(error: &ParseError, wgsl: &str) -> Fault {
     Fault::Internal(format!("canonical text does not parse: {text}"))
 }
 
-fn validate(module: &Module) -> Result<ModuleInfo, Box<WithSpan<ValidationError>>> {
+/// Validates as a wgpu device without optional features does.
+pub fn validate(module: &Module) -> Result<ModuleInfo, Box<WithSpan<ValidationError>>> {
     // naga's default capabilities are those of a wgpu device without optional features.
     Validator::new(ValidationFlags::all(), Capabilities::default()).validate(module).map_err(Box::new)
 }

@@ -40,7 +40,7 @@ pub fn reflect(module: &Module, info: &ModuleInfo, emitted: &Module) -> Result<R
     Ok(Reflection { entry_points, bindings })
 }
 
-fn stage(stage: ShaderStage) -> Result<Stage, String> {
+pub fn stage(stage: ShaderStage) -> Result<Stage, String> {
     match stage {
         ShaderStage::Vertex => Ok(Stage::Vertex),
         ShaderStage::Fragment => Ok(Stage::Fragment),

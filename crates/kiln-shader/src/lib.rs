@@ -14,6 +14,7 @@ use std::collections::BTreeSet;
 use kiln_diagnostic::Diagnostic;
 use serde::{Deserialize, Serialize};
 
+pub use emit::*;
 pub use link::Read;
 pub use reflect::*;
 pub use source_map::{FunctionSource, SourceMap};
@@ -21,6 +22,7 @@ pub use source_map::{FunctionSource, SourceMap};
 mod canonical;
 mod condition;
 mod describe;
+mod emit;
 mod explain;
 mod front;
 mod interface;

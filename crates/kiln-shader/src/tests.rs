@@ -8,6 +8,7 @@ use crate::{Compiled, Outcome, Program, compile};
 mod canonical;
 mod conditions;
 mod diagnostics;
+mod emit;
 mod hostile;
 mod imports;
 mod shaders;

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::{Files, compiled, set};
 use crate::{BindingKind, Compiled, Program, Reflection, scan};
 
-const FEATURES: [&str; 11] = [
+pub(super) const FEATURES: [&str; 11] = [
     "alpha_blend",
     "alpha_mask",
     "clearcoat",
@@ -36,7 +36,7 @@ const OWNED: [(&str, &str); 13] = [
     ("transmission", "transmission_"),
 ];
 
-fn shipped() -> Files {
+pub(super) fn shipped() -> Files {
     macro_rules! files {
         ($($path:literal),*) => {
             Files::new(&[$(($path, include_str!(concat!("../../../../", $path)))),*])
