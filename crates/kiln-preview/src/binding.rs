@@ -10,10 +10,11 @@ use crate::scene_gpu::GpuScene;
 use crate::slot::Slot;
 use crate::uniform::{FrameValues, fill_block, material_member};
 
-/// Group 0 of one program: its bind group, and the buffer that each frame writes.
+/// What all draws of one program share: group 0 with the buffer that each frame writes, and the author's parameters.
 #[derive(Debug)]
 pub(crate) struct FrameBinding {
-    pub group: Option<wgpu::BindGroup>,
+    group: Option<wgpu::BindGroup>,
+    parameters: Option<wgpu::BindGroup>,
     block: Option<(wgpu::Buffer, Bound)>,
 }
 
@@ -43,7 +44,16 @@ impl FrameBinding {
             view.map(wgpu::BindingResource::TextureView)
         };
         let group = create_group(gpu, program, 0, resource);
-        FrameBinding { group, block }
+        FrameBinding { group, parameters: program.parameter_group.clone(), block }
+    }
+
+    /// Sets groups 0 and 3.
+    pub fn set(&self, pass: &mut wgpu::RenderPass<'_>) {
+        for (index, group) in [(0, &self.group), (3, &self.parameters)] {
+            if let Some(group) = group {
+                pass.set_bind_group(index, group, &[]);
+            }
+        }
     }
 
     /// Whether pictures change with time.

@@ -75,5 +75,6 @@ pub(crate) fn tonemap_reflection() -> Reflection {
     Reflection {
         entry_points: vec![entry("vs_main", Stage::Vertex), entry("fs_main", Stage::Fragment)],
         bindings: vec![hdr_color],
+        ..Reflection::default()
     }
 }

@@ -6,10 +6,11 @@ use std::sync::{Mutex, PoisonError};
 use kiln_diagnostic::Diagnostic;
 use kiln_scene::Vertex;
 use kiln_shader::{Binding, BindingKind, Member, Reflection, Stage};
+use wgpu::util::DeviceExt as _;
 
 use crate::slot::Slot;
 use crate::target::Role;
-use crate::uniform::{FrameValues, Value, draw_member, long_type_name, material_member};
+use crate::uniform::{FrameValues, Value, draw_member, long_type_name, material_member, parameter_block};
 
 /// Format of the image that material and background shaders write.
 pub(crate) const HDR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
@@ -22,6 +23,9 @@ pub(crate) const SAMPLE_COUNT: u32 = 4;
 
 /// Largest uniform block accepted; wgpu's default limit.
 const UNIFORM_BYTES_MAX: u32 = 65536;
+
+/// Groups of `docs/shader-interface.md`.
+const GROUP_COUNT: usize = 4;
 
 /// How triangles of a material are rasterised and blended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -68,9 +72,11 @@ pub(crate) struct Program {
     module: wgpu::ShaderModule,
     attributes: Vec<wgpu::VertexAttribute>,
     /// Bindings by group.
-    pub groups: [Vec<Bound>; 3],
+    pub groups: [Vec<Bound>; GROUP_COUNT],
     /// Layouts by group; `None` where nothing is declared.
-    pub layouts: [Option<wgpu::BindGroupLayout>; 3],
+    pub layouts: [Option<wgpu::BindGroupLayout>; GROUP_COUNT],
+    /// Group 3: the author's parameters.
+    pub parameter_group: Option<wgpu::BindGroup>,
     pipeline_layout: wgpu::PipelineLayout,
     pipelines: Mutex<HashMap<Raster, wgpu::RenderPipeline>>,
 }
@@ -86,7 +92,8 @@ impl Program {
     ) -> Result<Self, Diagnostic> {
         let attributes = check_entry_points(name, role, reflection)?;
         let groups = check_bindings(name, role, &reflection.bindings)?;
-        let layouts = [0, 1, 2].map(|group| create_layout(device, name, group, &groups[group], reflection));
+        let layouts =
+            [0, 1, 2, 3].map(|group| create_layout(device, name, group, &groups[group], reflection));
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(name),
             bind_group_layouts: &layouts.each_ref().map(Option::as_ref),
@@ -97,7 +104,8 @@ impl Program {
             source: wgpu::ShaderSource::Wgsl(wgsl.into()),
         });
         let pipelines = Mutex::default();
-        Ok(Program { role, module, attributes, groups, layouts, pipeline_layout, pipelines })
+        let parameter_group = parameter_group(device, &layouts[3], &groups[3], reflection);
+        Ok(Program { parameter_group, role, module, attributes, groups, layouts, pipeline_layout, pipelines })
     }
 
     /// The pipeline for a raster state, created on first use.
@@ -214,8 +222,12 @@ fn vertex_attribute(
     Ok(wgpu::VertexAttribute { format, offset: offset as u64, shader_location })
 }
 
-fn check_bindings(shader: &str, role: Role, bindings: &[Binding]) -> Result<[Vec<Bound>; 3], Diagnostic> {
-    let mut groups: [Vec<Bound>; 3] = Default::default();
+fn check_bindings(
+    shader: &str,
+    role: Role,
+    bindings: &[Binding],
+) -> Result<[Vec<Bound>; GROUP_COUNT], Diagnostic> {
+    let mut groups: [Vec<Bound>; GROUP_COUNT] = Default::default();
     for binding in bindings {
         let slot = check_binding(shader, role, binding)?;
         let block = match &binding.kind {
@@ -236,7 +248,7 @@ fn check_binding(shader: &str, role: Role, binding: &Binding) -> Result<Slot, Di
         return Err(Diagnostic::error(format!("`{shader}` declares `{name}`, which Kiln does not know"))
             .with_help("names that can be bound are listed in docs/shader-interface.md"));
     };
-    if slot.group() > 0 && role != Role::Material {
+    if [1, 2].contains(&slot.group()) && role != Role::Material {
         return Err(Diagnostic::error(format!("`{shader}` declares `{name}`, which only materials have")));
     }
     if slot == Slot::HdrColor && role != Role::Tonemap {
@@ -268,6 +280,9 @@ fn check_members(
             format!("`{shader}` declares `{block}` of {size_bytes} bytes; 1 to {UNIFORM_BYTES_MAX} fit");
         return Err(Diagnostic::error(message));
     }
+    if slot == Slot::Params {
+        return Ok(());
+    }
     // A leading underscore marks padding: it stays zero.
     for member in members.iter().filter(|member| !member.name.starts_with('_')) {
         let name = &member.name;
@@ -296,6 +311,28 @@ fn example_of(slot: Slot, member: &str) -> Option<Value> {
         Slot::Draw => draw_member(glam::Mat4::IDENTITY, member),
         _ => None,
     }
+}
+
+/// The author's parameters with their first values.
+fn parameter_group(
+    device: &wgpu::Device,
+    layout: &Option<wgpu::BindGroupLayout>,
+    bounds: &[Bound],
+    reflection: &Reflection,
+) -> Option<wgpu::BindGroup> {
+    let (layout, bound) = (layout.as_ref()?, bounds.first()?);
+    let (size_bytes, members) = bound.block.as_ref()?;
+    let buffer = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some("params"),
+        contents: &parameter_block(*size_bytes, members, &reflection.parameters),
+        usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+    });
+    let entries = [wgpu::BindGroupEntry { binding: bound.binding, resource: buffer.as_entire_binding() }];
+    Some(device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("params"),
+        layout,
+        entries: &entries,
+    }))
 }
 
 fn create_layout(
@@ -344,7 +381,7 @@ fn binding_type(bound: &Bound) -> wgpu::BindingType {
         multisampled: false,
     };
     match bound.slot {
-        Slot::Frame | Slot::Material | Slot::Draw => wgpu::BindingType::Buffer {
+        Slot::Frame | Slot::Material | Slot::Draw | Slot::Params => wgpu::BindingType::Buffer {
             ty: wgpu::BufferBindingType::Uniform,
             // Draws share one buffer, each at its own offset.
             has_dynamic_offset: bound.slot == Slot::Draw,

@@ -180,7 +180,7 @@ impl Renderer {
         let [width, height] = self.picture.size.map(|pixels| pixels as f32);
         pass.set_viewport(0.0, 0.0, width, height, 1.0, 1.0);
         pass.set_pipeline(pipeline);
-        set_group(pass, 0, frame.group.as_ref());
+        frame.set(pass);
         pass.draw(0..3, 0..1);
         pass.set_viewport(0.0, 0.0, width, height, 0.0, 1.0);
     }
@@ -197,7 +197,7 @@ impl Renderer {
             ..Default::default()
         });
         pass.set_pipeline(&prepared.tonemap.pipeline(&self.gpu.device, Raster::FULL_SCREEN));
-        set_group(&mut pass, 0, frame.group.as_ref());
+        frame.set(&mut pass);
         pass.draw(0..3, 0..1);
     }
 }
@@ -217,20 +217,16 @@ fn draw_item(pass: &mut wgpu::RenderPass<'_>, scene: &GpuScene, draws: &DrawList
     let program = &draws.programs[item.program];
     let mesh = &scene.meshes[item.mesh];
     pass.set_pipeline(&item.pipeline);
-    set_group(pass, 0, program.frame.group.as_ref());
-    set_group(pass, 1, item.material_group.as_ref());
+    program.frame.set(pass);
+    if let Some(group) = &item.material_group {
+        pass.set_bind_group(1, group, &[]);
+    }
     if let Some(group) = &program.draw_group {
         pass.set_bind_group(2, group, &[item.draw_offset]);
     }
     pass.set_vertex_buffer(0, mesh.vertices.slice(..));
     pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
     pass.draw_indexed(0..mesh.index_count, 0, 0..1);
-}
-
-fn set_group(pass: &mut wgpu::RenderPass<'_>, index: u32, group: Option<&wgpu::BindGroup>) {
-    if let Some(group) = group {
-        pass.set_bind_group(index, group, &[]);
-    }
 }
 
 impl Picture {

@@ -83,9 +83,11 @@ pub(crate) enum Slot {
     MaterialTexture(Map),
     MaterialSampler(Map),
     Draw,
+    /// The author's own parameters.
+    Params,
 }
 
-const FIXED: [(Slot, &str); 10] = [
+const FIXED: [(Slot, &str); 11] = [
     (Slot::Frame, "frame"),
     (Slot::EnvSkybox, "env_skybox"),
     (Slot::EnvIrradiance, "env_irradiance"),
@@ -96,6 +98,7 @@ const FIXED: [(Slot, &str); 10] = [
     (Slot::LutSampler, "lut_sampler"),
     (Slot::Material, "material"),
     (Slot::Draw, "draw"),
+    (Slot::Params, "params"),
 ];
 
 impl Slot {
@@ -107,11 +110,12 @@ impl Slot {
         fixed.or_else(texture).or_else(sampler)
     }
 
-    /// The bind group it belongs to: 0 frame, 1 material, 2 draw.
+    /// The bind group it belongs to: 0 frame, 1 material, 2 draw, 3 the author's own.
     pub fn group(self) -> u32 {
         match self {
             Slot::Material | Slot::MaterialTexture(_) | Slot::MaterialSampler(_) => 1,
             Slot::Draw => 2,
+            Slot::Params => 3,
             _ => 0,
         }
     }
@@ -134,7 +138,7 @@ impl Slot {
     /// What a shader must declare it as.
     pub fn expects(self) -> &'static str {
         match self {
-            Slot::Frame | Slot::Material | Slot::Draw => "uniform",
+            Slot::Frame | Slot::Material | Slot::Draw | Slot::Params => "uniform",
             Slot::EnvSkybox | Slot::EnvIrradiance | Slot::EnvSpecular => "texture_cube<f32>",
             Slot::LutGgx | Slot::HdrColor | Slot::MaterialTexture(_) => "texture_2d<f32>",
             Slot::EnvSampler | Slot::LutSampler | Slot::MaterialSampler(_) => "sampler",

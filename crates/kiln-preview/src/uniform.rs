@@ -2,7 +2,7 @@
 
 use glam::{Mat3, Mat4, Vec3};
 use kiln_scene::{AlphaMode, Material, TextureRef};
-use kiln_shader::Member;
+use kiln_shader::{Member, Parameter};
 
 use crate::slot::Map;
 
@@ -171,6 +171,32 @@ pub(crate) fn fill_block(
         let start = member.offset_bytes as usize;
         if let Some(place) = block.get_mut(start..start + bytes.len()) {
             place.copy_from_slice(bytes);
+        }
+    }
+    block
+}
+
+/// The bytes of the author's own uniform block: each parameter's first value at its member, zeros elsewhere. A member with
+/// more components than the value has ones there, as the alpha of a colour.
+pub(crate) fn parameter_block(size_bytes: u32, members: &[Member], parameters: &[Parameter]) -> Vec<u8> {
+    let mut block = vec![0; size_bytes as usize];
+    for member in members {
+        let Some(parameter) = parameters.iter().find(|parameter| parameter.name == member.name) else {
+            continue;
+        };
+        let components = (member.size_bytes as usize / 4).min(4);
+        let ty = long_type_name(&member.ty);
+        for index in 0..components {
+            let value = parameter.default.get(index).copied().unwrap_or(1.0);
+            let bytes = match &*ty {
+                ty if ty.contains("f32") => (value as f32).to_le_bytes(),
+                ty if ty.contains("i32") => (value as i32).to_le_bytes(),
+                _ => (value as u32).to_le_bytes(),
+            };
+            let start = member.offset_bytes as usize + 4 * index;
+            if let Some(place) = block.get_mut(start..start + 4) {
+                place.copy_from_slice(&bytes);
+            }
         }
     }
     block

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use kiln_diagnostic::Diagnostic;
-use kiln_shader::Program;
+use kiln_shader::{Language, Program};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -55,6 +55,8 @@ pub struct ShaderConfig {
     pub role: Role,
     /// Feature sets that are compiled whatever scenes ask for.
     pub variants: BTreeSet<BTreeSet<String>>,
+    /// Languages that its variants are written in, for engines.
+    pub emit: BTreeSet<Language>,
 }
 
 /// What a shader is used for.
@@ -297,6 +299,7 @@ fn read_shader(section: &mut Section, name: &str) -> ShaderConfig {
         program,
         role: section.choice("role", &roles).unwrap_or(by_name),
         variants: variants.iter().map(|variant| parse_variant(variant)).collect(),
+        emit: read_languages(section),
     }
 }
 
@@ -304,6 +307,22 @@ fn read_shader(section: &mut Section, name: &str) -> ShaderConfig {
 fn read_define(text: &str) -> (String, String) {
     let (name, value) = text.split_once('=').unwrap_or((text, "1"));
     (name.trim().to_owned(), value.trim().to_owned())
+}
+
+fn read_languages(section: &mut Section) -> BTreeSet<Language> {
+    let mut languages = BTreeSet::new();
+    for name in section.texts("emit").unwrap_or_default() {
+        match Language::parse(&name) {
+            Some(language) => _ = languages.insert(language),
+            None => {
+                let known = Language::ALL.map(Language::name);
+                let help = suggest(&name, known.into_iter());
+                let help = help.unwrap_or_else(|| format!("known are: {}", known.join(", ")));
+                section.fail(format!("`emit` names no language `{name}`"), section.place("emit"), Some(help));
+            }
+        }
+    }
+    languages
 }
 
 fn check_program(section: &mut Section, program: &Program) {

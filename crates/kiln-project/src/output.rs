@@ -225,6 +225,11 @@ fn target_files(store: &Store, name: &str, target: &Target) -> Result<Vec<Output
     }
     Ok(match target.kind.as_str() {
         "cube" | "lut" => vec![(format!("{name}.ktx2"), texture_file(name, target, &contents).into())],
+        "emit" => {
+            // The last part of the name is the language, which the parts say.
+            let stem = name.rsplit_once('/').map_or(name, |(stem, _)| stem);
+            contents.into_iter().map(|(part, bytes)| (format!("{stem}.{part}"), bytes)).collect()
+        }
         _ => contents.into_iter().map(|(part, bytes)| (part_path(name, part), bytes)).collect(),
     })
 }

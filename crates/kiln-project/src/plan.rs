@@ -97,6 +97,7 @@ pub(crate) mod rank {
     pub(crate) const SHADER: u32 = 0;
     pub(crate) const SCENE: u32 = 1;
     pub(crate) const ENVIRONMENT: u32 = 2;
+    pub(crate) const EMIT: u32 = 3;
 }
 
 /// Collects actions and targets.

@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use kiln_build::{Action, ActionId, ActionOutput, Engine, Error, Input, Scan, little_memory};
 use kiln_diagnostic::Diagnostic;
-use kiln_worker::{Died, Reply, Sources, Task};
+use kiln_shader::{Language, Outcome};
+use kiln_worker::{Died, Sources};
 use serde_json::{Value, json};
 
 use crate::config::variant_name;
@@ -69,12 +70,69 @@ pub(crate) fn plan_shader(
             planner.graph.add(compile_action(engine, name, config, features, &scan))
         });
         planner.subjects.insert(compile, program.subject().to_owned());
+        for &language in &config.emit {
+            let emit = planner.graph.add(emit_action(name, &variant, compile, language));
+            planner.subjects.insert(emit, program.subject().to_owned());
+            let target = format!("emit/{name}/{variant}/{language}");
+            planner.target(
+                target,
+                "emit",
+                json!({"language": language}),
+                vec![PartSpec::Folder(emit, FILES)],
+            );
+        }
         let meta =
             json!({"shader": name, "role": config.role.name(), "features": crate::parse_variant(&variant)});
         let parts = vec![PartSpec::one(compile, "wgsl"), PartSpec::one(compile, "reflection")];
         planner.target(format!("shader/{name}/{variant}"), "shader", meta, parts);
     }
     Ok(())
+}
+
+/// The outputs of an [`emit_action`]: `files/spv`, or `files/vert.glsl` …, and `files/LANGUAGE.json`, which says what is
+/// bound where.
+const FILES: &str = "files";
+
+/// Version of the writers of other languages.
+const EMIT_RECIPE: u32 = 1;
+
+fn emit_action(name: &str, variant: &str, compile: ActionId, language: Language) -> Action {
+    Action {
+        name: format!("emit shader/{name}/{variant} as {language}"),
+        command: command("emit", EMIT_RECIPE, json!({"language": language}), &[FILES]),
+        inputs: vec![Input::Output { action: compile, output: "wgsl".to_owned() }],
+        rank: rank::EMIT,
+        memory: little_memory(),
+        perform: Arc::new(move |inputs| {
+            let wgsl = String::from_utf8_lossy(&inputs.required(0)?).into_owned();
+            let emitted = match kiln_worker::emit(wgsl, language) {
+                Ok(Ok(emitted)) => emitted,
+                Ok(Err(diagnostic)) => return Ok(failure(diagnostic)),
+                Err(died) => return death(died, ""),
+            };
+            let facts: Vec<Value> = emitted
+                .iter()
+                .map(|file| json!({"file": file.file_suffix, "notes": file.notes, "bindings": file.bindings}))
+                .collect();
+            let mut text = serde_json::to_vec_pretty(&facts).unwrap_or_default();
+            text.push(b'\n');
+            let files = emitted.into_iter().map(|file| (file_name(&file.file_suffix), file.bytes));
+            let outputs = files.chain([(file_name(&format!(".{language}.json")), text)]).collect();
+            Ok(ActionOutput { outputs, ..ActionOutput::default() })
+        }),
+    }
+}
+
+fn file_name(suffix: &str) -> String {
+    format!("{FILES}/{}", suffix.trim_start_matches('.'))
+}
+
+/// A worker's death is the input's fault; that there is none is not.
+fn death(died: Died, subject: &str) -> Result<ActionOutput, Error> {
+    match died {
+        Died::NoWorker(reason) => Err(Error::Action { action: "compile".to_owned(), reason }),
+        Died::TooSlow(_) | Died::Crashed(_) => Ok(failure(died.diagnostic(subject))),
+    }
 }
 
 fn unknown_feature(shader: &str, variant: &str, feature: &str, known: &BTreeSet<String>) -> Diagnostic {
@@ -113,29 +171,24 @@ fn compile_action(
             if let Some(missing) = program.roots.iter().find(|root| sources.read(root).is_none()) {
                 return Ok(failure(no_content("shader", unreadable.as_deref()).in_file(missing)));
             }
-            let task = Task::Compile { program: program.clone(), features: features.clone(), sources };
-            compile(&task, program.subject())
+            match kiln_worker::compile(&program, &features, sources) {
+                Ok(outcome) => Ok(compiled(outcome)),
+                Err(died) => death(died, program.subject()),
+            }
         }),
     }
 }
 
-fn compile(task: &Task, subject: &str) -> Result<ActionOutput, Error> {
-    let outcome = match kiln_worker::run(task) {
-        Ok(Reply::Compiled(outcome)) => outcome,
-        Err(Died::NoWorker(reason)) => {
-            return Err(Error::Action { action: "compile".to_owned(), reason });
-        }
-        Err(died) => return Ok(failure(died.diagnostic(subject))),
-    };
+fn compiled(outcome: Outcome) -> ActionOutput {
     let diagnostics = outcome.diagnostics;
     let Some(compiled) = outcome.compiled else {
-        return Ok(ActionOutput { diagnostics, ..Default::default() });
+        return ActionOutput { diagnostics, ..Default::default() };
     };
     // The source map changes with every comment; whoever wants it compiles again, which takes milliseconds.
     let reflection = serde_json::to_vec(&compiled.reflection).unwrap_or_default();
     let outputs =
         vec![("wgsl".to_owned(), compiled.wgsl.into_bytes()), ("reflection".to_owned(), reflection)];
-    Ok(ActionOutput { outputs, meta: Value::Null, diagnostics })
+    ActionOutput { outputs, meta: Value::Null, diagnostics }
 }
 
 /// Shader text that is no UTF-8 shows its wrong bytes as U+FFFD in the diagnostic that follows.

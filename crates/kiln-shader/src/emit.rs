@@ -29,6 +29,7 @@
 
 use std::fmt;
 
+use kiln_diagnostic::Diagnostic;
 use naga::back::pipeline_constants::{PipelineConstantError, process_overrides};
 use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
 use naga::valid::ModuleInfo;
@@ -110,7 +111,7 @@ impl fmt::Display for Language {
 }
 
 /// A file.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Emitted {
     /// What its name ends with. All files of one [`emit`] differ in it: where several entry points have the
     /// same stage, it begins with `.` and the entry point's name.
@@ -162,6 +163,21 @@ pub enum EmitError {
     /// A fault of the shader compiler.
     #[error("the shader compiler failed: {0}")]
     Internal(String),
+}
+
+impl EmitError {
+    /// As a message; the caller knows which shader it is about.
+    pub fn diagnostic(&self) -> Diagnostic {
+        let diagnostic = Diagnostic::error(self.to_string());
+        match self {
+            EmitError::Unsupported { help, .. } => diagnostic.with_help(help),
+            EmitError::OverrideWithoutDefault { name, .. } => {
+                diagnostic.with_help(format!("write `override {name}: … = …;`"))
+            }
+            EmitError::TooMany { .. } => diagnostic.with_help("use fewer, or put textures into arrays"),
+            EmitError::Invalid(_) | EmitError::Internal(_) => diagnostic,
+        }
+    }
 }
 
 /// Writes `wgsl`, the text of a [`crate::Compiled`], in `language`. Equal inputs give equal bytes.

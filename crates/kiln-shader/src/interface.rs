@@ -5,7 +5,7 @@ use naga::proc::GlobalCtx;
 use naga::valid::ModuleInfo;
 use naga::{AddressSpace, ImageClass, ImageDimension, Module, ShaderStage, StorageAccess, TypeInner};
 
-use crate::{Binding, BindingKind, EntryPoint, Member, Reflection, Stage, VertexInput};
+use crate::{Binding, BindingKind, EntryPoint, Member, Override, Reflection, Stage, VertexInput};
 
 /// Reflects `module`. Entry points get their names from `emitted`, the canonical text read back, because a
 /// pipeline is made from that text.
@@ -37,7 +37,33 @@ pub fn reflect(module: &Module, info: &ModuleInfo, emitted: &Module) -> Result<R
         bindings.push(Binding { group, binding, name, kind: kind(module, variable)?, stages });
     }
     bindings.sort_by_key(|binding| (binding.group, binding.binding));
-    Ok(Reflection { entry_points, bindings })
+    let overrides = module.overrides.iter().map(|(_, constant)| reflect_override(module, constant)).collect();
+    Ok(Reflection { entry_points, bindings, overrides, parameters: Vec::new() })
+}
+
+fn reflect_override(module: &Module, constant: &naga::Override) -> Override {
+    let default = constant.init.and_then(|init| match module.global_expressions[init] {
+        naga::Expression::Literal(literal) => literal_value(literal),
+        _ => None,
+    });
+    Override {
+        name: constant.name.clone().unwrap_or_default(),
+        id: constant.id,
+        ty: type_name(module, constant.ty),
+        default,
+    }
+}
+
+fn literal_value(literal: naga::Literal) -> Option<f64> {
+    match literal {
+        naga::Literal::F32(value) => Some(f64::from(value)),
+        naga::Literal::I32(value) => Some(f64::from(value)),
+        naga::Literal::U32(value) => Some(f64::from(value)),
+        naga::Literal::Bool(value) => Some(f64::from(u8::from(value))),
+        naga::Literal::AbstractFloat(value) => Some(value),
+        naga::Literal::AbstractInt(value) => Some(value as f64),
+        _ => None,
+    }
 }
 
 pub fn stage(stage: ShaderStage) -> Result<Stage, String> {

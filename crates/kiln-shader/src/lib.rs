@@ -30,6 +30,7 @@ mod join;
 mod limits;
 mod link;
 mod module;
+mod parameter;
 mod reflect;
 mod resolve;
 mod scope;
@@ -38,6 +39,7 @@ mod suggest;
 #[cfg(test)]
 mod tests;
 mod token;
+mod wgsl;
 
 /// A file that was looked at. Missing ones count too, because their appearance changes the result.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -67,6 +69,9 @@ pub struct Outcome {
     pub compiled: Option<Compiled>,
     /// Where its functions come from.
     pub source_map: SourceMap,
+    /// Whether all that is wrong is that nothing can be drawn or dispatched with it: a module for others to import.
+    #[serde(default)]
+    pub is_library: bool,
     /// What is wrong, the first of each module, in the order in which modules were found.
     pub diagnostics: Vec<Diagnostic>,
     /// Every file looked at, in that order.
@@ -106,27 +111,7 @@ impl Program {
 
 /// Compiles a program for a set of features. `read` gets paths relative to the project and is asked at most once for each.
 pub fn compile(program: &Program, features: &BTreeSet<String>, read: &mut Read<'_>) -> Outcome {
-    let root = program.subject();
-    let graph = link::Graph::load(root, condition::Mode::Features(features), read);
-    let result = if kiln_diagnostic::has_errors(&graph.diagnostics) {
-        Err(Vec::new())
-    } else {
-        let linked = join::Linked::join(&graph, &graph.order);
-        front::compile_linked(&linked.text)
-            .map(|linked_shader| {
-                (linked_shader.compiled, source_map::place(linked_shader.functions, &graph, &linked))
-            })
-            .map_err(|fault| explain::all(&graph, &linked, fault))
-    };
-    let link::Graph { dependencies, features, mut diagnostics, .. } = graph;
-    let (compiled, source_map) = match result {
-        Ok((compiled, source_map)) => (Some(compiled), source_map),
-        Err(mut found) => {
-            diagnostics.append(&mut found);
-            (None, SourceMap::default())
-        }
-    };
-    Outcome { compiled, source_map, diagnostics, dependencies, features }
+    wgsl::compile(program.subject(), features, read)
 }
 
 /// What a shader may need, under any features.
@@ -140,6 +125,5 @@ pub struct Scan {
 
 /// Looks at a shader's imports and conditions, without compiling it.
 pub fn scan(program: &Program, read: &mut Read<'_>) -> Scan {
-    let graph = link::Graph::load(program.subject(), condition::Mode::Everything, read);
-    Scan { dependencies: graph.dependencies, features: graph.features }
+    wgsl::scan(program.subject(), read)
 }

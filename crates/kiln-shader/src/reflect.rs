@@ -9,6 +9,78 @@ pub struct Reflection {
     pub entry_points: Vec<EntryPoint>,
     /// Resources that at least one entry point uses, sorted by group and binding.
     pub bindings: Vec<Binding>,
+    /// Constants that a pipeline may set, in source order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub overrides: Vec<Override>,
+    /// What the author offers to be changed while one looks, in source order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parameters: Vec<Parameter>,
+}
+
+/// A constant that a pipeline may set.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Override {
+    /// Its name.
+    pub name: String,
+    /// `@id`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub id: Option<u16>,
+    /// WGSL type: `bool`, `f32`, `i32` or `u32`.
+    pub ty: String,
+    /// Its value unless a pipeline sets it, if that is a literal; 0 and 1 for `bool`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub default: Option<f64>,
+}
+
+/// An override or a uniform's member that the author annotated, as `// @slider(0, 1, 0.5)`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Parameter {
+    /// Its name.
+    pub name: String,
+    /// Where its value goes.
+    pub place: ParameterPlace,
+    /// How one changes it.
+    pub widget: Widget,
+    /// Its first value, component by component.
+    pub default: Vec<f64>,
+    /// What it does, in the author's words; may be empty.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub label: String,
+}
+
+/// Where a parameter's value goes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ParameterPlace {
+    /// Into the pipeline.
+    Override,
+    /// Into a uniform buffer.
+    Member {
+        /// The variable's name.
+        uniform: String,
+    },
+}
+
+/// How a parameter is changed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Widget {
+    /// A number between two.
+    Slider {
+        /// The least value.
+        least: f64,
+        /// The greatest.
+        greatest: f64,
+    },
+    /// A linear Rec. 709 colour.
+    Color,
+    /// 0 or 1.
+    Toggle,
+    /// The number of one of these.
+    Choice {
+        /// What the numbers from 0 on stand for.
+        names: Vec<String>,
+    },
 }
 
 /// Shader stage.

@@ -11,6 +11,7 @@ mod diagnostics;
 mod emit;
 mod hostile;
 mod imports;
+mod parameters;
 mod shaders;
 
 /// A project in memory.

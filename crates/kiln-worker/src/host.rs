@@ -38,7 +38,7 @@ pub enum Died {
 }
 
 impl Died {
-    /// As a message about the shader `file`.
+    /// As a message about the shader `file`; empty if the caller adds it.
     pub fn diagnostic(&self, file: &str) -> Diagnostic {
         let (message, help) = match self {
             Died::TooSlow(limit) => (
@@ -54,7 +54,8 @@ impl Died {
                 "see whether the program may start processes, and whether memory is left",
             ),
         };
-        Diagnostic::error(message).in_file(file).with_help(help)
+        let diagnostic = Diagnostic::error(message).with_help(help);
+        if file.is_empty() { diagnostic } else { diagnostic.in_file(file) }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Compiles shaders in a process of its own: no input takes the daemon down, hangs it or eats its memory.
 //!
-//! Start at [`run`]: a [`Task`] in, a [`Reply`] out. A program that calls [`use_program`] first has its tasks done by
+//! Start at [`compile`]. A program that calls [`use_program`] first has its tasks done by
 //! persistent child processes that run [`serve`]; one that does not (a test, a tool of its own) does them itself, and so
 //! trusts its input.
 //!
@@ -17,8 +17,12 @@ mod task;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::OnceLock;
+
+use kiln_diagnostic::Diagnostic;
+use kiln_shader::{Emitted, Language, Outcome, Program};
 
 pub use host::{Died, Limits, Workers};
 pub use serve::serve;
@@ -39,11 +43,35 @@ pub fn warm_up() {
     }
 }
 
-/// Does a task: in a child, if [`use_program`] was called.
+/// [`kiln_shader::compile`], where `sources` has the text of each file that may be asked for.
 ///
 /// # Errors
 /// The child died of it.
-pub fn run(task: &Task) -> Result<Reply, Died> {
+pub fn compile(program: &Program, features: &BTreeSet<String>, sources: Sources) -> Result<Outcome, Died> {
+    let task = Task::Compile { program: program.clone(), features: features.clone(), sources };
+    match run(&task)? {
+        Reply::Compiled(outcome) => Ok(outcome),
+        Reply::Emitted(_) => Err(other_answer()),
+    }
+}
+
+/// [`kiln_shader::emit`]; what cannot be written comes as a message.
+///
+/// # Errors
+/// The child died of it.
+pub fn emit(wgsl: String, language: Language) -> Result<Result<Vec<Emitted>, Diagnostic>, Died> {
+    match run(&Task::Emit { wgsl, language })? {
+        Reply::Emitted(emitted) => Ok(emitted),
+        Reply::Compiled(_) => Err(other_answer()),
+    }
+}
+
+fn other_answer() -> Died {
+    Died::NoWorker("it answered another question".to_owned())
+}
+
+/// Does a task: in a child, if [`use_program`] was called.
+fn run(task: &Task) -> Result<Reply, Died> {
     match WORKERS.get() {
         Some(workers) => workers.run(task),
         None => Ok(task.perform()),

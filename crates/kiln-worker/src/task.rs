@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use kiln_shader::{Outcome, Program};
+use kiln_diagnostic::Diagnostic;
+use kiln_shader::{Emitted, Language, Outcome, Program};
 use serde::{Deserialize, Serialize};
 
 /// A shader's files: the text of each, by its path relative to the project; those that are missing too.
@@ -29,6 +30,13 @@ pub enum Task {
         /// All it may import.
         sources: Sources,
     },
+    /// [`kiln_shader::emit`].
+    Emit {
+        /// Canonical text.
+        wgsl: String,
+        /// What to write it in.
+        language: Language,
+    },
 }
 
 /// What came of a task, in the same order.
@@ -36,6 +44,8 @@ pub enum Task {
 pub enum Reply {
     /// Of [`Task::Compile`].
     Compiled(Outcome),
+    /// Of [`Task::Emit`]: the files, or why there are none.
+    Emitted(Result<Vec<Emitted>, Diagnostic>),
 }
 
 impl Task {
@@ -44,6 +54,9 @@ impl Task {
         match self {
             Task::Compile { program, features, sources } => {
                 Reply::Compiled(kiln_shader::compile(program, features, &mut |path| sources.read(path)))
+            }
+            Task::Emit { wgsl, language } => {
+                Reply::Emitted(kiln_shader::emit(wgsl, *language).map_err(|error| error.diagnostic()))
             }
         }
     }

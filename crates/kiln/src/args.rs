@@ -4,6 +4,10 @@ use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, Parser, Subcommand};
 
+mod shader;
+
+pub(crate) use shader::*;
+
 /// Look-dev without the wait: bakes image-based lighting without noise, checks shaders, and shows every edit
 /// in a live preview.
 #[derive(Debug, Parser)]
@@ -31,6 +35,9 @@ pub(crate) enum Command {
     Env(EnvArgs),
     /// Write a project's environments as an engine wants them
     Export(ExportArgs),
+    /// Check, reflect and emit shaders, of a project or of none
+    #[command(subcommand)]
+    Shader(ShaderCommand),
     /// Say what a bake would run, and why, without running it
     Plan(ReadArgs),
     /// Explain a target: what changed when, with old and new values, and why the rest was left alone

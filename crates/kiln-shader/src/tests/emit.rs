@@ -343,7 +343,9 @@ fn deepest_allowed_shaders_are_written() {
         format!("@fragment fn fs() {{ {} }}", nested("loop {", "break;", "}", 90)),
     ];
     for source in texts {
-        let outcome = compile(&crate::Program::of("a.wgsl"), &Default::default(), &mut |_| Some(source.as_str().into()));
+        let outcome = compile(&crate::Program::of("a.wgsl"), &Default::default(), &mut |_| {
+            Some(source.as_str().into())
+        });
         let wgsl = compiled(outcome).wgsl;
         Language::ALL.into_iter().for_each(|language| drop(emitted(&wgsl, language)));
     }

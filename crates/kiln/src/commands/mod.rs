@@ -12,6 +12,7 @@ pub(crate) mod init;
 pub(crate) mod plan;
 #[cfg(feature = "preview")]
 pub(crate) mod preview;
+pub(crate) mod shader;
 pub(crate) mod verify;
 pub(crate) mod watch;
 pub(crate) mod why;

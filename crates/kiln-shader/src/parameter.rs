@@ -1,0 +1,161 @@
+//! Parameters that a shader's author offers to whoever looks at it: annotated overrides and uniform members.
+//!
+//! WGSL and GLSL have no place for such facts, so they stand in a line comment behind the declaration, or on the line
+//! before it:
+//!
+//! ```wgsl
+//! override samples: u32 = 16u;   // @slider(1, 64) samples a pixel
+//! struct Params {
+//!     tint: vec3f,               // @color(1.0, 0.9, 0.8)
+//!     wetness: f32,              // @slider(0, 1, 0.25) how wet it looks
+//!     // @choice(1, flat, smooth, both)
+//!     mode: u32,
+//!     is_lit: u32,               // @toggle(true)
+//! }
+//! ```
+
+use std::ops::Range;
+
+use kiln_diagnostic::Diagnostic;
+use serde::{Deserialize, Serialize};
+
+use crate::reflect::{BindingKind, Parameter, ParameterPlace, Reflection, Widget};
+use crate::token::{self, Kind, Token};
+
+/// An annotation and the name it stands at.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Annotation {
+    name: String,
+    widget: Widget,
+    default: Vec<f64>,
+    label: String,
+}
+
+const KINDS: [&str; 4] = ["slider", "color", "toggle", "choice"];
+
+/// The annotations of a file.
+pub(crate) fn annotations(path: &str, text: &str, diagnostics: &mut Vec<Diagnostic>) -> Vec<Annotation> {
+    let mut found = Vec::new();
+    let mut start = 0;
+    for line in text.split_inclusive('\n') {
+        let end = start + line.len();
+        if let Some((code, comment)) = line.split_once("//")
+            && let Some((kind, rest)) = keyword(comment)
+        {
+            let from = start + line.len() - comment.trim_start().len();
+            let range = from..from + comment.trim().len();
+            let declared =
+                Some(code).filter(|code| !code.trim().is_empty()).unwrap_or_else(|| next_code(&text[end..]));
+            match annotation(kind, rest, declared) {
+                Ok(annotation) => found.push(annotation),
+                Err(fault) => diagnostics.push(warning(path, text, range, kind, fault)),
+            }
+        }
+        start = end;
+    }
+    found
+}
+
+fn warning(path: &str, text: &str, range: Range<usize>, kind: &str, fault: String) -> Diagnostic {
+    let help = match kind {
+        "slider" => "write `@slider(least, greatest)` or `@slider(least, greatest, default)`",
+        "color" => "write `@color(red, green, blue)`, linear",
+        "toggle" => "write `@toggle(true)` or `@toggle(false)`",
+        _ => "write `@choice(default, name of 0, name of 1, …)`",
+    };
+    Diagnostic::warning(fault).at(path, text, range).with_help(help)
+}
+
+/// `@slider(…` at the beginning of a comment: the word, and what follows its bracket.
+fn keyword(comment: &str) -> Option<(&str, &str)> {
+    let (word, rest) = comment.trim_start().strip_prefix('@')?.split_once('(')?;
+    KINDS.contains(&word).then_some((word, rest))
+}
+
+/// The first line that is not empty.
+fn next_code(text: &str) -> &str {
+    text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default()
+}
+
+fn annotation(kind: &str, rest: &str, code: &str) -> Result<Annotation, String> {
+    let (inside, label) = rest.split_once(')').ok_or("this annotation is never closed")?;
+    let arguments: Vec<&str> = inside.split(',').map(str::trim).collect();
+    let name = declared_name(code).ok_or("this annotation stands at no declaration")?.to_owned();
+    let label = label.trim().to_owned();
+    let number = |text: &str| -> Result<f64, String> {
+        let number: Option<f64> = text.parse().ok();
+        number.filter(|number| number.is_finite()).ok_or_else(|| format!("`{text}` is no number"))
+    };
+    let numbers = || arguments.iter().map(|argument| number(argument)).collect::<Result<Vec<f64>, String>>();
+    let (widget, default) = match kind {
+        "slider" => match numbers()?[..] {
+            [least, greatest, ref default @ ..] if least < greatest && default.len() <= 1 => {
+                if default.iter().any(|default| !(least..=greatest).contains(default)) {
+                    return Err("the default lies outside the slider".to_owned());
+                }
+                (Widget::Slider { least, greatest }, default.to_vec())
+            }
+            _ => return Err("a slider has a least and a greatest value".to_owned()),
+        },
+        "color" => match numbers()? {
+            rgb if rgb.len() == 3 => (Widget::Color, rgb),
+            _ => return Err("a color has three components".to_owned()),
+        },
+        "toggle" => match arguments[..] {
+            ["true"] => (Widget::Toggle, vec![1.0]),
+            ["false"] => (Widget::Toggle, vec![0.0]),
+            _ => return Err("a toggle is true or false".to_owned()),
+        },
+        _ => {
+            let names: Vec<String> = arguments[1..].iter().map(|&name| name.to_owned()).collect();
+            let default = number(arguments[0])?;
+            if default.fract() != 0.0 || !(0.0..names.len() as f64).contains(&default) {
+                return Err("the default of a choice is the number of one of its names".to_owned());
+            }
+            (Widget::Choice { names }, vec![default])
+        }
+    };
+    Ok(Annotation { name, widget, default, label })
+}
+
+/// What a line declares: the word before its `:` in WGSL, before its `;`, `=` or `[` in GLSL.
+fn declared_name(code: &str) -> Option<&str> {
+    let tokens = token::tokenize(code).ok()?;
+    let word_before = |at: usize| -> Option<&str> {
+        let token = tokens.get(at.checked_sub(1)?).filter(|token| token.kind == Kind::Word)?;
+        Some(&code[token.range()])
+    };
+    let place =
+        |marks: &[char]| tokens.iter().position(|token: &Token| marks.iter().any(|mark| token.is(*mark)));
+    place(&[':']).or_else(|| place(&[';', '=', '['])).and_then(word_before)
+}
+
+/// The parameters that a shader has: annotations whose name is an override or a member of a uniform. A color may have a
+/// fourth component, which is 1.
+pub(crate) fn parameters(reflection: &Reflection, annotations: Vec<Annotation>) -> Vec<Parameter> {
+    let mut parameters: Vec<Parameter> = Vec::new();
+    for annotation in annotations {
+        let overridden = reflection.overrides.iter().find(|constant| constant.name == annotation.name);
+        let place = overridden.map(|_| ParameterPlace::Override).or_else(|| {
+            let has_member = |kind: &BindingKind| match kind {
+                BindingKind::Uniform { members, .. } => {
+                    members.iter().any(|member| member.name == annotation.name)
+                }
+                _ => false,
+            };
+            let binding = reflection.bindings.iter().find(|binding| has_member(&binding.kind))?;
+            Some(ParameterPlace::Member { uniform: binding.name.clone() })
+        });
+        let Annotation { name, widget, mut default, label } = annotation;
+        if default.is_empty() {
+            // A slider without a default starts where the override does, else at its least.
+            let least = if let Widget::Slider { least, .. } = widget { least } else { 0.0 };
+            default.push(overridden.and_then(|constant| constant.default).unwrap_or(least));
+        }
+        let is_known = parameters.iter().any(|known| known.name == name);
+        if let Some(place) = place.filter(|_| !is_known) {
+            parameters.push(Parameter { name, place, widget, default, label });
+        }
+    }
+    parameters
+}

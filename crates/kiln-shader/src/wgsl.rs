@@ -1,0 +1,52 @@
+//! WGSL: link, compile, explain.
+
+use std::collections::BTreeSet;
+
+use kiln_diagnostic::{Diagnostic, has_errors};
+
+use crate::condition::Mode;
+use crate::front::Fault;
+use crate::join::Linked;
+use crate::link::{Graph, Read};
+use crate::{Outcome, Scan, explain, front, parameter, source_map};
+
+/// Compiles the root module `root`.
+pub fn compile(root: &str, features: &BTreeSet<String>, read: &mut Read<'_>) -> Outcome {
+    let mut graph = Graph::load(root, Mode::Features(features), read);
+    let mut outcome = Outcome {
+        diagnostics: std::mem::take(&mut graph.diagnostics),
+        dependencies: std::mem::take(&mut graph.dependencies),
+        features: std::mem::take(&mut graph.features),
+        ..Outcome::default()
+    };
+    if has_errors(&outcome.diagnostics) {
+        return outcome;
+    }
+    let linked = Linked::join(&graph, &graph.order);
+    match front::compile_linked(&linked.text) {
+        Ok(shader) => {
+            outcome.source_map = source_map::place(shader.functions, &graph, &linked);
+            let annotations = annotations(&graph, &mut outcome.diagnostics);
+            let mut compiled = shader.compiled;
+            compiled.reflection.parameters = parameter::parameters(&compiled.reflection, annotations);
+            outcome.compiled = Some(compiled);
+        }
+        Err(fault) => {
+            outcome.is_library = matches!(fault, Fault::NoEntryPoint);
+            outcome.diagnostics.extend(explain::all(&graph, &linked, fault));
+        }
+    }
+    outcome
+}
+
+fn annotations(graph: &Graph, diagnostics: &mut Vec<Diagnostic>) -> Vec<parameter::Annotation> {
+    let of_module =
+        |module: &crate::link::Module| parameter::annotations(&module.path, &module.text, diagnostics);
+    graph.modules.iter().flat_map(of_module).collect()
+}
+
+/// Looks at imports and conditions under any features.
+pub fn scan(root: &str, read: &mut Read<'_>) -> Scan {
+    let graph = Graph::load(root, Mode::Everything, read);
+    Scan { dependencies: graph.dependencies, features: graph.features }
+}

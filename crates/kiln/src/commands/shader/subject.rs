@@ -1,0 +1,236 @@
+//! Which shaders a command is about, their variants, and compiling them.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::Context as _;
+use kiln_diagnostic::Diagnostic;
+use kiln_project::{PROJECT_FILE, Project, variant_name};
+use kiln_shader::{Outcome, Program};
+use kiln_worker::Sources;
+
+use crate::args::SubjectArgs;
+use crate::place::{self, WrongInput};
+
+/// Longest file that is read: the compiler refuses what is longer than 1 MiB, and says so.
+const FILE_BYTES_MAX: u64 = 2 << 20;
+
+/// A shader with all it may need.
+pub(super) struct Subject {
+    /// What people call it: its name in a project, or its first file.
+    pub(super) name: String,
+    /// The folder that paths are relative to.
+    pub(super) base: PathBuf,
+    pub(super) program: Program,
+    /// Features that its conditions name.
+    pub(super) features: BTreeSet<String>,
+    /// Feature sets to compile.
+    pub(super) asked: BTreeSet<BTreeSet<String>>,
+    sources: Sources,
+}
+
+/// A variant that is compiled: all asked sets that cannot differ.
+pub(super) struct Variant {
+    /// The asked sets, by name.
+    pub(super) names: Vec<String>,
+    pub(super) outcome: Outcome,
+}
+
+/// The shaders that a command line names. What is wrong with the projects among them comes too.
+pub(super) fn subjects(args: &SubjectArgs) -> anyhow::Result<(Vec<Subject>, Vec<Diagnostic>)> {
+    let (mut subjects, mut diagnostics) = (Vec::new(), Vec::new());
+    let variants: BTreeSet<_> = args.variants.iter().map(|name| kiln_project::parse_variant(name)).collect();
+    let mut programs: BTreeMap<(PathBuf, String), Vec<PathBuf>> = BTreeMap::new();
+    for path in &args.files {
+        if path.is_dir() {
+            of_project(path, &variants, &mut subjects, &mut diagnostics)?;
+            continue;
+        }
+        let file = path.canonicalize().ok().filter(|file| file.is_file());
+        let file =
+            file.ok_or_else(|| WrongInput(format!("{} is no file that can be read", path.display())))?;
+        programs.entry(program_of(&file)).or_default().push(file);
+    }
+    for (_, files) in programs {
+        subjects.push(of_files(files, args, &variants)?);
+    }
+    Ok((subjects, diagnostics))
+}
+
+/// Stages of one GLSL program differ in what follows the first dot; a WGSL file is a program of its own.
+fn program_of(file: &Path) -> (PathBuf, String) {
+    let folder = file.parent().map(Path::to_owned).unwrap_or_default();
+    let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let is_wgsl = name.ends_with(".wgsl");
+    let stem = if is_wgsl { name } else { name.split('.').next().unwrap_or_default().to_owned() };
+    (folder, stem)
+}
+
+fn of_files(
+    mut files: Vec<PathBuf>,
+    args: &SubjectArgs,
+    variants: &BTreeSet<BTreeSet<String>>,
+) -> anyhow::Result<Subject> {
+    // The vertex stage first, as it runs.
+    files.sort_by_key(|file| !file.to_string_lossy().contains(".vert"));
+    files.dedup();
+    let base = base_of(&files[0])?;
+    let relative = |path: &Path| -> anyhow::Result<String> {
+        let path = path.canonicalize().with_context(|| format!("finding {}", path.display()))?;
+        let inside = path.strip_prefix(&base).ok().map(|path| path.to_string_lossy().replace('\\', "/"));
+        inside.ok_or_else(|| {
+            let message = format!(
+                "{} lies outside {}, where this shader's files are looked for",
+                path.display(),
+                base.display()
+            );
+            WrongInput(format!("{message}\n  help: run kiln in a folder above both")).into()
+        })
+    };
+    let all = |paths: &[PathBuf]| -> anyhow::Result<Vec<String>> {
+        paths.iter().map(|path| relative(path)).collect()
+    };
+    let define = |text: &String| {
+        let (name, value) = text.split_once('=').unwrap_or((text, "1"));
+        (name.to_owned(), value.to_owned())
+    };
+    let program = Program {
+        roots: all(&files)?,
+        defines: args.defines.iter().map(define).collect(),
+        include_dirs: all(&args.include_dirs)?,
+        prelude: all(&args.prelude)?,
+    };
+    Ok(Subject::new(program.subject().to_owned(), base, program, variants.clone()))
+}
+
+/// The folder whose files a shader may import: its project, else where the user stands, else its own.
+fn base_of(file: &Path) -> anyhow::Result<PathBuf> {
+    let folder = file.parent().unwrap_or(Path::new("/"));
+    if let Some(project) = folder.ancestors().find(|folder| folder.join(PROJECT_FILE).is_file()) {
+        return Ok(project.to_owned());
+    }
+    let here = std::env::current_dir().and_then(|here| here.canonicalize()).context("finding this folder")?;
+    Ok(if folder.starts_with(&here) { here } else { folder.to_owned() })
+}
+
+/// The shaders of a project, each for what its scenes and its table ask for.
+fn of_project(
+    dir: &Path,
+    variants: &BTreeSet<BTreeSet<String>>,
+    subjects: &mut Vec<Subject>,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> anyhow::Result<()> {
+    let engine = place::open_engine(dir)?;
+    let plan = kiln_project::plan(&engine, None).context("planning")?;
+    diagnostics.extend(plan.diagnostics.iter().cloned());
+    let Project { shaders, .. } = &plan.project;
+    for (name, config) in shaders {
+        let prefix = format!("shader/{name}/");
+        let names = plan.targets.iter().filter_map(|target| target.name.strip_prefix(&prefix));
+        let planned: BTreeSet<_> = names.map(kiln_project::parse_variant).collect();
+        let asked = if variants.is_empty() { planned } else { variants.clone() };
+        subjects.push(Subject::new(name.clone(), engine.folder().to_owned(), config.program.clone(), asked));
+    }
+    Ok(())
+}
+
+impl Subject {
+    fn new(name: String, base: PathBuf, program: Program, asked: BTreeSet<BTreeSet<String>>) -> Subject {
+        let mut sources = Sources::default();
+        let mut read = |path: &str| {
+            let text = read_text(&base.join(path));
+            sources.0.insert(path.to_owned(), text.clone());
+            text
+        };
+        let features = kiln_shader::scan(&program, &mut read).features;
+        let asked = if asked.is_empty() { usual_variants(&features) } else { asked };
+        Subject { name, base, program, features, asked, sources }
+    }
+
+    /// Compiles every variant once.
+    pub(super) fn compile(&self) -> anyhow::Result<Vec<Variant>> {
+        let mut variants: BTreeMap<BTreeSet<String>, Vec<String>> = BTreeMap::new();
+        for asked in &self.asked {
+            // Features that no condition names make no difference.
+            let effective = asked.intersection(&self.features).cloned().collect();
+            variants.entry(effective).or_default().push(variant_name(asked));
+        }
+        let compile = |(features, names): (BTreeSet<String>, Vec<String>)| {
+            let outcome = match kiln_worker::compile(&self.program, &features, self.sources.clone()) {
+                Ok(outcome) => outcome,
+                Err(kiln_worker::Died::NoWorker(reason)) => anyhow::bail!("no shader compiler: {reason}"),
+                Err(died) => {
+                    let diagnostics = vec![died.diagnostic(self.program.subject())];
+                    Outcome { diagnostics, ..Outcome::default() }
+                }
+            };
+            Ok(Variant { names, outcome })
+        };
+        variants.into_iter().map(compile).collect()
+    }
+
+    /// What is asked for without being known.
+    pub(super) fn unknown_features(&self) -> Vec<Diagnostic> {
+        let unknown: BTreeSet<&String> =
+            self.asked.iter().flatten().filter(|feature| !self.features.contains(*feature)).collect();
+        let known = self.features.iter().cloned().collect::<Vec<_>>().join(", ");
+        let message = |feature: &String| {
+            let help = if known.is_empty() {
+                "it has no conditions".to_owned()
+            } else {
+                format!("known are: {known}")
+            };
+            Diagnostic::note(format!("no condition of `{}` names the feature `{feature}`", self.name))
+                .with_help(help)
+        };
+        unknown.into_iter().map(message).collect()
+    }
+}
+
+impl Variant {
+    /// Whether it compiles, or is sound and has no entry point.
+    pub(super) fn is_good(&self) -> bool {
+        self.outcome.is_library || self.outcome.compiled.is_some()
+    }
+}
+
+/// The plain one, each feature alone, all together: what conditions go wrong in most.
+fn usual_variants(features: &BTreeSet<String>) -> BTreeSet<BTreeSet<String>> {
+    let single = features.iter().map(|feature| BTreeSet::from([feature.clone()]));
+    single.chain([BTreeSet::new(), features.clone()]).collect()
+}
+
+/// A file's text; wrong bytes show in the diagnostic that follows.
+fn read_text(path: &Path) -> Option<Arc<str>> {
+    let length = std::fs::metadata(path).ok().filter(std::fs::Metadata::is_file)?.len();
+    if length > FILE_BYTES_MAX {
+        // Long enough to be refused by the compiler, with the file's name.
+        return Some(" ".repeat(FILE_BYTES_MAX as usize).into());
+    }
+    Some(String::from_utf8_lossy(&std::fs::read(path).ok()?).into())
+}
+
+/// The diagnostics of all variants, each once, with the variants that have it where others have not.
+pub(super) fn merged(variants: &[Variant]) -> Vec<Diagnostic> {
+    let mut found: Vec<(Diagnostic, Vec<&str>)> = Vec::new();
+    for variant in variants {
+        for diagnostic in &variant.outcome.diagnostics {
+            let names = variant.names.iter().map(String::as_str);
+            match found.iter_mut().find(|(known, _)| known == diagnostic) {
+                Some((_, in_variants)) => in_variants.extend(names),
+                None => found.push((diagnostic.clone(), names.collect())),
+            }
+        }
+    }
+    let all: usize = variants.iter().map(|variant| variant.names.len()).sum();
+    let with_variants = |(diagnostic, names): (Diagnostic, Vec<&str>)| match names.len() {
+        count if count == all => diagnostic,
+        count => {
+            let shown = names.iter().take(4).copied().collect::<Vec<_>>().join(", ");
+            let more = if count > 4 { " …" } else { "" };
+            diagnostic.with_note(format!("in {count} of {all} variants: {shown}{more}"))
+        }
+    };
+    found.into_iter().map(with_variants).collect()
+}

@@ -1,0 +1,71 @@
+//! `kiln shader variants`.
+
+use std::collections::BTreeMap;
+use std::process::ExitCode;
+
+use kiln_build::Digest;
+use serde_json::{Value, json};
+
+use super::exit_code;
+use super::subject::{Variant, merged, subjects};
+use crate::args::VariantsArgs;
+use crate::out::say;
+use crate::report;
+
+pub(super) fn run(args: &VariantsArgs) -> anyhow::Result<ExitCode> {
+    let (subjects, mut diagnostics) = subjects(&args.subjects)?;
+    let mut shaders: Vec<Value> = Vec::new();
+    for subject in &subjects {
+        let variants = subject.compile()?;
+        diagnostics.extend(merged(&variants));
+        let mut texts: BTreeMap<Option<Digest>, Vec<&Variant>> = BTreeMap::new();
+        for variant in &variants {
+            let compiled = variant.outcome.compiled.as_ref();
+            texts.entry(compiled.map(|shader| Digest::of(shader.wgsl.as_bytes()))).or_default().push(variant);
+        }
+        let (asked, compiled) = (subject.asked.len(), variants.len());
+        let artefacts = texts.keys().flatten().count();
+        shaders.push(json!({
+            "shader": subject.name,
+            "features": subject.features,
+            "asked": asked,
+            "compiled": compiled,
+            "artefacts": artefacts,
+            "variants": texts.iter().map(|(digest, variants)| json!({
+                "sha256": digest.map(|digest| digest.to_string()),
+                "bytes": size_of(variants[0]),
+                "names": names(variants),
+            })).collect::<Vec<_>>(),
+        }));
+        if args.json {
+            continue;
+        }
+        let features: Vec<&str> = subject.features.iter().map(String::as_str).collect();
+        let features = if features.is_empty() { "none".to_owned() } else { features.join(", ") };
+        say!("{}\n  features: {features}", subject.name);
+        for (digest, variants) in &texts {
+            let digest =
+                digest.map_or("does not compile".to_owned(), |digest| digest.to_string()[..12].to_owned());
+            let bytes = size_of(variants[0]).map_or_else(String::new, |bytes| report::size(bytes as u64));
+            say!("  {digest:<16} {bytes:>9}   {}", names(variants).join(" = "));
+        }
+        say!(
+            "  {asked} asked, {compiled} compiled, {} shared, {artefacts} artefacts",
+            asked.saturating_sub(artefacts)
+        );
+    }
+    if args.json {
+        say!("{:#}", json!({"shaders": shaders, "diagnostics": diagnostics}));
+    } else {
+        report::print_diagnostics(&diagnostics, false);
+    }
+    Ok(exit_code(&diagnostics))
+}
+
+fn names(variants: &[&Variant]) -> Vec<String> {
+    variants.iter().flat_map(|variant| variant.names.iter().cloned()).collect()
+}
+
+fn size_of(variant: &Variant) -> Option<usize> {
+    Some(variant.outcome.compiled.as_ref()?.wgsl.len())
+}
