@@ -41,10 +41,25 @@ pub fn compile_linked(text: &str) -> Result<Compiled, Fault> {
     if text.len() > limits::LINKED_BYTES_MAX {
         return Err(Fault::TooLong { limit: limits::LINKED_BYTES_MAX, actual: text.len() });
     }
+    on_large_stack(|| run(text))
+}
+
+/// Validates and reflects text that is canonical already: stages that were joined.
+pub fn compile_joined(text: String) -> Result<Compiled, Fault> {
+    on_large_stack(|| {
+        let module = naga::front::wgsl::parse_str(&text).map_err(|error| reparse_fault(&error, &text))?;
+        let info = validate(&module).map_err(|error| Fault::Source(validation_finding(&module, &error)))?;
+        let reflection = interface::reflect(&module, &info, &module).map_err(Fault::Internal)?;
+        Ok(Compiled { wgsl: text, reflection })
+    })
+}
+
+/// Runs `work`, which calls naga, on a thread with a large stack; its panic becomes a fault.
+pub fn on_large_stack<T: Send>(work: impl FnOnce() -> Result<T, Fault> + Send) -> Result<T, Fault> {
     std::thread::scope(|scope| {
         let builder = std::thread::Builder::new().name("kiln-shader".to_owned()).stack_size(STACK_BYTES);
         let worker = builder
-            .spawn_scoped(scope, || run(text))
+            .spawn_scoped(scope, work)
             .map_err(|error| Fault::Internal(format!("no thread: {error}")))?;
         // naga panics on some hostile input (gfx-rs/wgpu #9499, #7687): that ends this thread only.
         worker.join().unwrap_or_else(|panic| Err(Fault::Internal(panic_text(panic.as_ref()))))
@@ -79,7 +94,8 @@ fn reparse_fault(error: &ParseError, wgsl: &str) -> Fault {
     Fault::Internal(format!("canonical text does not parse: {text}"))
 }
 
-fn validate(module: &Module) -> Result<ModuleInfo, Box<WithSpan<ValidationError>>> {
+/// Validates for a device without optional features.
+pub fn validate(module: &Module) -> Result<ModuleInfo, Box<WithSpan<ValidationError>>> {
     // naga's default capabilities are those of a wgpu device without optional features.
     Validator::new(ValidationFlags::all(), Capabilities::default()).validate(module).map_err(Box::new)
 }
@@ -90,7 +106,8 @@ fn parse_finding(error: &ParseError) -> Finding {
     Finding { message: describe::clean(error.message()), notes, labels: labels.collect() }
 }
 
-fn validation_finding(module: &Module, error: &WithSpan<ValidationError>) -> Finding {
+/// What `error` says, in the words of the module.
+pub fn validation_finding(module: &Module, error: &WithSpan<ValidationError>) -> Finding {
     let labels = error.spans().filter_map(|(span, label)| Some((span.to_range()?, label.clone())));
     let mut labels: Vec<_> = labels.collect();
     // naga lists the function before the expression in it.

@@ -8,6 +8,8 @@ use crate::{Compiled, Outcome, compile};
 mod canonical;
 mod conditions;
 mod diagnostics;
+mod glsl;
+mod glsl_hostile;
 mod hostile;
 mod shaders;
 
