@@ -71,11 +71,17 @@ impl Kept {
 
     /// Replaces `name` by a new placeholder, unless it is a name of WGSL's own that the text may need.
     fn hide_global(&mut self, name: &mut String) {
-        if !naga::keywords::wgsl::BUILTIN_IDENTIFIERS.contains(&name.as_str()) && !is_baked(name) {
+        let builtins = naga::keywords::wgsl::BUILTIN_IDENTIFIERS;
+        if !builtins.contains(&name.as_str()) && !is_baked(name) && is_legal(name) {
             self.globals.insert(name.clone());
             self.hide_member(name);
         }
     }
+}
+
+/// Whether WGSL allows `name`: other languages have names that are reserved words there.
+fn is_legal(name: &str) -> bool {
+    !naga::keywords::wgsl::RESERVED.contains(&name) && name != "_" && !name.starts_with("__")
 }
 
 /// Whether `name` looks like what naga calls intermediate results.
@@ -104,7 +110,7 @@ fn replace_names(module: &mut Module) -> Kept {
             // Members of predeclared structs, as `modf` returns, are WGSL's own.
             let predeclared = ty.name.as_ref().is_some_and(|name| name.starts_with("__"));
             let names = members.iter_mut().filter_map(|member| member.name.as_mut());
-            names.filter(|_| !predeclared).for_each(|name| kept.hide_member(name));
+            names.filter(|name| !predeclared && is_legal(name)).for_each(|name| kept.hide_member(name));
         }
         types.insert(ty, module.types.get_span(handle));
     }

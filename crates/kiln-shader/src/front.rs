@@ -65,6 +65,16 @@ fn check_length(text: &str) -> Result<(), Fault> {
     Ok(())
 }
 
+/// Validates and reflects text that is canonical already: stages that were joined.
+pub fn compile_joined(text: String) -> Result<Compiled, Fault> {
+    on_deep_stack(Fault::Internal, || {
+        let module = naga::front::wgsl::parse_str(&text).map_err(|error| reparse_fault(&error, &text))?;
+        let info = validate(&module).map_err(|error| Fault::Source(validation_finding(&module, &error)))?;
+        let reflection = interface::reflect(&module, &info, &module).map_err(Fault::Internal)?;
+        Ok(Compiled { wgsl: text, reflection })
+    })
+}
+
 /// Runs `work` with a stack that naga's recursion fits in. A panic in it becomes the error `internal`.
 pub fn on_deep_stack<T: Send, E: Send>(
     internal: fn(String) -> E,
@@ -124,7 +134,8 @@ fn parse_finding(error: &ParseError) -> Finding {
     Finding { message: describe::clean(error.message()), notes, labels: labels.collect() }
 }
 
-fn validation_finding(module: &Module, error: &WithSpan<ValidationError>) -> Finding {
+/// What `error` says, in the words of the module.
+pub fn validation_finding(module: &Module, error: &WithSpan<ValidationError>) -> Finding {
     let labels = error.spans().filter_map(|(span, label)| Some((span.to_range()?, label.clone())));
     let mut labels: Vec<_> = labels.collect();
     // naga lists the function before the expression in it.

@@ -25,11 +25,13 @@ mod describe;
 mod emit;
 mod explain;
 mod front;
+mod glsl;
 mod interface;
 mod join;
 mod limits;
 mod link;
 mod module;
+mod names;
 mod parameter;
 mod reflect;
 mod resolve;
@@ -103,15 +105,24 @@ impl Program {
         Program { roots: vec![root.to_owned()], ..Program::default() }
     }
 
+    /// Whether it is GLSL, by its files' names; else it is WGSL.
+    pub fn is_glsl(&self) -> bool {
+        self.roots.iter().any(|root| glsl::is_glsl(root))
+    }
+
     /// The file that stands for the program in messages: its first.
     pub fn subject(&self) -> &str {
         self.roots.first().map_or("", String::as_str)
     }
 }
 
-/// Compiles a program for a set of features. `read` gets paths relative to the project and is asked at most once for each.
+/// Compiles a program for a set of features: in WGSL they are what `@if` asks for, in GLSL the feature `sheen` is the macro
+/// `FEATURE_SHEEN`. `read` gets paths relative to the project and is asked at most once for each.
 pub fn compile(program: &Program, features: &BTreeSet<String>, read: &mut Read<'_>) -> Outcome {
-    wgsl::compile(program.subject(), features, read)
+    match program.is_glsl() {
+        true => glsl::compile(program, features, read),
+        false => wgsl::compile(program.subject(), features, read),
+    }
 }
 
 /// What a shader may need, under any features.
@@ -125,5 +136,8 @@ pub struct Scan {
 
 /// Looks at a shader's imports and conditions, without compiling it.
 pub fn scan(program: &Program, read: &mut Read<'_>) -> Scan {
-    wgsl::scan(program.subject(), read)
+    match program.is_glsl() {
+        true => glsl::scan(program, read),
+        false => wgsl::scan(program.subject(), read),
+    }
 }

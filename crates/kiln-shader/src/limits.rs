@@ -1,6 +1,6 @@
 //! Limits on what is handed to naga, checked here because naga's parser and validator recurse.
 
-use kiln_diagnostic::Diagnostic;
+use std::ops::Range;
 
 use crate::token::{Kind, Token};
 
@@ -16,15 +16,26 @@ pub const NESTING_MAX: usize = 100;
 /// those that are open. naga recurses over expressions, so this bounds its stack.
 pub const EXPRESSION_DEPTH_MAX: usize = 500;
 
+/// What breaks a limit, or a bracket without its partner.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Fault {
+    /// What is wrong.
+    pub message: String,
+    /// Where in the text.
+    pub range: Range<usize>,
+    /// The bracket that is open there, if it is about a wrong one.
+    pub opened: Option<Range<usize>>,
+}
+
 /// Checks that brackets pair up and that nothing is nested deeper than the limits.
-pub fn check_nesting(file: &str, text: &str, tokens: &[Token]) -> Result<(), Box<Diagnostic>> {
+pub fn check_nesting(text: &str, tokens: &[Token]) -> Result<(), Fault> {
     let mut open: Vec<Level> = Vec::new();
     let mut level = Level { bracket: None, operators: 0, before: 0 };
     for (index, token) in tokens.iter().enumerate() {
         let Kind::Mark(mark) = token.kind else {
             // `else if` chains become nested blocks in naga.
             level.operators += usize::from(token.is_word(text, "else"));
-            check_depth(file, text, token, &level)?;
+            check_depth(token, &level)?;
             continue;
         };
         match mark {
@@ -36,7 +47,7 @@ pub fn check_nesting(file: &str, text: &str, tokens: &[Token]) -> Result<(), Box
             ')' | ']' | '}' => {
                 let closed = level.bracket.filter(|opened| opened.is(opening(mark)));
                 let Some(outer) = open.pop().filter(|_| closed.is_some()) else {
-                    return Err(Box::new(unmatched(file, text, token, level.bracket)));
+                    return Err(unmatched(text, token, level.bracket));
                 };
                 level = outer;
                 // A call or an index wraps what stands before it; a block ends its statement.
@@ -54,12 +65,15 @@ pub fn check_nesting(file: &str, text: &str, tokens: &[Token]) -> Result<(), Box
         }
         if open.len() > NESTING_MAX {
             let message = format!("brackets are nested deeper than {NESTING_MAX}");
-            return Err(Box::new(Diagnostic::error(message).at(file, text, token.range())));
+            return Err(Fault { message, range: token.range(), opened: None });
         }
-        check_depth(file, text, token, &level)?;
+        check_depth(token, &level)?;
     }
     match level.bracket {
-        Some(token) => Err(Box::new(unclosed(file, text, &token))),
+        Some(token) => {
+            let message = format!("`{}` is never closed", &text[token.range()]);
+            Err(Fault { message, range: token.range(), opened: None })
+        }
         None => Ok(()),
     }
 }
@@ -74,17 +88,12 @@ struct Level {
     before: usize,
 }
 
-fn check_depth(file: &str, text: &str, token: &Token, level: &Level) -> Result<(), Box<Diagnostic>> {
-    let depth = level.before + level.operators;
-    if depth <= EXPRESSION_DEPTH_MAX {
+fn check_depth(token: &Token, level: &Level) -> Result<(), Fault> {
+    if level.before + level.operators <= EXPRESSION_DEPTH_MAX {
         return Ok(());
     }
     let message = format!("expression has more than {EXPRESSION_DEPTH_MAX} operators in one piece");
-    Err(Box::new(
-        Diagnostic::error(message)
-            .at(file, text, token.range())
-            .with_help("split it with `let`, or end an `else if` chain with `switch`"),
-    ))
+    Err(Fault { message, range: token.range(), opened: None })
 }
 
 fn opening(closing: char) -> char {
@@ -95,21 +104,11 @@ fn opening(closing: char) -> char {
     }
 }
 
-fn unmatched(file: &str, text: &str, token: &Token, opened: Option<Token>) -> Diagnostic {
+fn unmatched(text: &str, token: &Token, opened: Option<Token>) -> Fault {
     let closing = &text[token.range()];
-    match opened {
-        None => Diagnostic::error(format!("`{closing}` closes nothing")).at(file, text, token.range()),
-        Some(opened) => {
-            let bracket = &text[opened.range()];
-            let span = kiln_diagnostic::Span::new(text, opened.range());
-            Diagnostic::error(format!("`{closing}` does not close `{bracket}`"))
-                .at(file, text, token.range())
-                .with_note(format!("`{bracket}` was opened at {file}:{}:{}", span.line, span.column))
-        }
-    }
-}
-
-fn unclosed(file: &str, text: &str, token: &Token) -> Diagnostic {
-    let bracket = &text[token.range()];
-    Diagnostic::error(format!("`{bracket}` is never closed")).at(file, text, token.range())
+    let message = match opened {
+        None => format!("`{closing}` closes nothing"),
+        Some(opened) => format!("`{closing}` does not close `{}`", &text[opened.range()]),
+    };
+    Fault { message, range: token.range(), opened: opened.map(|opened| opened.range()) }
 }

@@ -253,7 +253,7 @@ impl Loader<'_, '_> {
         let tokens = token::tokenize(text).map_err(|OpenComment(at)| {
             Box::new(Diagnostic::error("`/*` is never closed").at(path, text, at..at + 2))
         })?;
-        limits::check_nesting(path, text, &tokens)?;
+        limits::check_nesting(text, &tokens).map_err(|fault| Box::new(nesting_error(path, text, fault)))?;
         Ok(tokens)
     }
 
@@ -373,6 +373,19 @@ enum Found {
     Nowhere(Vec<String>),
     /// It was said why.
     Refused,
+}
+
+fn nesting_error(path: &str, text: &str, fault: limits::Fault) -> Diagnostic {
+    let diagnostic = Diagnostic::error(&fault.message).at(path, text, fault.range);
+    if let Some(opened) = fault.opened {
+        let span = Span::new(text, opened.clone());
+        let note = format!("`{}` was opened at {path}:{}:{}", &text[opened], span.line, span.column);
+        return diagnostic.with_note(note);
+    }
+    if fault.message.starts_with("expression") {
+        return diagnostic.with_help("split it with `let`, or end an `else if` chain with `switch`");
+    }
+    diagnostic
 }
 
 /// Names that the module declares under other features only.

@@ -9,6 +9,8 @@ mod canonical;
 mod conditions;
 mod diagnostics;
 mod emit;
+mod glsl;
+mod glsl_hostile;
 mod hostile;
 mod imports;
 mod parameters;

@@ -1,0 +1,195 @@
+//! What a declaration may not say, because WGSL or naga has nothing for it.
+
+use super::Parsed;
+use super::builtin;
+use super::declare::{Block, DROPPED, Item, Qualifiers, Struct, Variable};
+use super::lex::Token;
+use super::source::{Place, Sources};
+
+/// Layouts that are understood, or change nothing because everything is filled by name.
+const LAYOUTS: [&str; 27] = [
+    "align",
+    "binding",
+    "column_major",
+    "constant_id",
+    "depth_any",
+    "depth_greater",
+    "depth_less",
+    "depth_unchanged",
+    "early_fragment_tests",
+    "index",
+    "local_size_x",
+    "local_size_y",
+    "local_size_z",
+    "location",
+    "offset",
+    "origin_upper_left",
+    "packed",
+    "push_constant",
+    "row_major",
+    "scalar",
+    "set",
+    "shared",
+    "std140",
+    "std430",
+    "r32f",
+    "rgba8",
+    "rgba16f",
+];
+
+/// Layouts that ask for what is not there, with what to do instead.
+const REFUSED_LAYOUTS: [(&str, &str); 12] = [
+    ("bindless_sampler", "declare each texture as a uniform"),
+    ("bindless_image", "declare each image as a uniform"),
+    ("buffer_reference", "use a storage buffer and an index"),
+    ("component", "give each variable a location of its own"),
+    ("input_attachment_index", "read a texture that an earlier pass wrote"),
+    ("local_size_x_id", "write the size as a literal"),
+    ("local_size_y_id", "write the size as a literal"),
+    ("local_size_z_id", "write the size as a literal"),
+    ("pixel_center_integer", "pixel centres lie at one half: subtract `0.5` from `gl_FragCoord.xy`"),
+    ("xfb_buffer", "write to a storage buffer in a compute stage"),
+    ("xfb_offset", "write to a storage buffer in a compute stage"),
+    ("triangles", "build the geometry before"),
+];
+
+fn report(sources: &mut Sources<'_, '_>, place: Place, message: String, help: &str) {
+    let diagnostic = sources.error(place, message).with_help(help);
+    sources.diagnostics.push(diagnostic);
+}
+
+/// Whether `name` is the format of an image, as `rgba8`.
+pub fn is_format(name: &str) -> bool {
+    name.starts_with('r') && name.bytes().any(|byte| byte.is_ascii_digit()) && !name.contains("major")
+}
+
+/// Whether a token says nothing to WGSL.
+pub fn is_dropped(token: &Token) -> bool {
+    DROPPED.contains(&&*token.text)
+}
+
+/// Checks the names and numbers in `layout(…)`.
+pub fn layouts(sources: &mut Sources<'_, '_>, qualifiers: &Qualifiers) {
+    for layout in &qualifiers.layout {
+        let name = &*layout.name.text;
+        if let Some((_, help)) = REFUSED_LAYOUTS.iter().find(|(refused, _)| *refused == name) {
+            report(sources, layout.name.place, format!("layout `{name}` is not supported"), help);
+        } else if !LAYOUTS.contains(&name) && !is_format(name) {
+            let help = crate::suggest::closest(name, LAYOUTS.into_iter());
+            let mut diagnostic = sources.error(layout.name.place, format!("there is no layout `{name}`"));
+            diagnostic.help = help.map(|name| format!("did you mean `{name}`?"));
+            sources.diagnostics.push(diagnostic);
+        } else if ["set", "binding", "location", "constant_id"].contains(&name)
+            && qualifiers.integer(name).is_none()
+        {
+            let place = layout.value.first().map_or(layout.name.place, |value| value.place);
+            report(sources, place, format!("`{name}` must be an integer literal"), "use a macro for a name");
+        }
+    }
+}
+
+/// Checks a type's name.
+pub fn type_name(sources: &mut Sources<'_, '_>, ty: &Token) {
+    if let Some(help) = builtin::replacement(&ty.text) {
+        report(sources, ty.place, format!("type `{}` is not supported", ty.text), help);
+    }
+}
+
+/// Checks a member of any struct.
+pub fn struct_member(sources: &mut Sources<'_, '_>, member: &Variable) {
+    type_name(sources, &member.ty);
+    if builtin::combined(&member.ty.text).is_some() {
+        let message = format!("`{}` is a texture inside of a struct", member.name.text);
+        report(sources, member.place(), message, "declare the texture as a uniform of its own");
+    }
+}
+
+/// Checks that a uniform's type can be stored.
+pub fn uniform_type(sources: &mut Sources<'_, '_>, stage: &Parsed, variable: &Variable) {
+    type_name(sources, &variable.ty);
+    if variable.array.len() > 3 {
+        let message = format!("`{}` is an array of arrays", variable.name.text);
+        report(sources, variable.place(), message, "use one array, and compute the index");
+    }
+    members_of(sources, stage, &variable.ty, 0);
+}
+
+fn structure<'a>(stage: &'a Parsed, name: &Token) -> Option<&'a Struct> {
+    stage.items.iter().find_map(|item| match item {
+        Item::Struct(structure) if structure.name.text == name.text => Some(structure),
+        _ => None,
+    })
+}
+
+/// Members of a struct that is stored in a uniform.
+fn members_of(sources: &mut Sources<'_, '_>, stage: &Parsed, ty: &Token, depth: usize) {
+    let Some(structure) = structure(stage, ty).filter(|_| depth < 8) else { return };
+    for member in &structure.members {
+        let (name, ty) = (&member.name.text, &*member.ty.text);
+        if ty == "bool" || ty.starts_with("bvec") {
+            let message = format!("`{name}` is `{ty}`, inside of a struct that is a uniform");
+            report(sources, member.place(), message, "use `int` and compare it with 0");
+        } else if !member.array.is_empty() && is_narrow(ty) {
+            let message = format!("`{name}` is an array of `{ty}`, inside of a struct that is a uniform");
+            report(sources, member.place(), message, "use an array of `vec4`");
+        }
+        members_of(sources, stage, &member.ty, depth + 1);
+    }
+}
+
+/// Whether array elements of `ty` are closer than the 16 bytes that uniforms need.
+fn is_narrow(ty: &str) -> bool {
+    matches!(ty, "float" | "int" | "uint") || builtin::vector_len(ty) == Some(2)
+}
+
+/// Checks a member of a block.
+pub fn block_member(sources: &mut Sources<'_, '_>, stage: &Parsed, member: &Variable, is_uniform: bool) {
+    if is_uniform {
+        return uniform_type(sources, stage, member);
+    }
+    type_name(sources, &member.ty);
+    if member.ty.is("bool") || member.ty.text.starts_with("bvec") {
+        let message =
+            format!("`{}` is `{}`, which cannot be stored in a buffer", member.name.text, member.ty.text);
+        report(sources, member.place(), message, "use `uint` and compare it with 0");
+    }
+}
+
+/// `readonly` or nothing; WGSL has no buffers that are only written.
+pub fn buffer_access(block: &Block) -> &'static str {
+    let says = |qualifiers: &Qualifiers| qualifiers.access.iter().any(|access| access.is("readonly"));
+    let all = !block.members.is_empty() && block.members.iter().all(|member| says(&member.qualifiers));
+    if says(&block.qualifiers) || all { "readonly" } else { "" }
+}
+
+/// How an image is accessed: as declared, else by what is done with it.
+pub fn image_access(sources: &mut Sources<'_, '_>, stage: &Parsed, variable: &Variable) -> &'static str {
+    let is_image = variable.ty.text.contains("image");
+    if !is_image {
+        return "";
+    }
+    let says = |word: &str| variable.qualifiers.access.iter().any(|access| access.is(word));
+    let calls = |function: &str| {
+        let mut calls = stage.tokens.windows(3);
+        calls.any(|call| call[0].is(function) && call[1].is("(") && call[2].text == variable.name.text)
+    };
+    match (says("readonly"), says("writeonly")) {
+        (true, _) => return "readonly",
+        (_, true) => return "writeonly",
+        _ => {}
+    }
+    match (calls("imageLoad"), calls("imageStore")) {
+        (true, false) => "readonly",
+        (false, _) => "writeonly",
+        (true, true) => {
+            let single =
+                ["r32f", "r32i", "r32ui"].iter().any(|format| variable.qualifiers.layout(format).is_some());
+            if !single {
+                let message =
+                    format!("`{}` is read and written, which its format does not allow", variable.name.text);
+                report(sources, variable.place(), message, "use `r32f`, `r32i` or `r32ui`, or two images");
+            }
+            ""
+        }
+    }
+}

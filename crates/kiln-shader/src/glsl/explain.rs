@@ -1,0 +1,93 @@
+//! naga's findings at the author's place, with what to do.
+
+use kiln_diagnostic::{Diagnostic, Span};
+
+use super::Parsed;
+use super::bindings::Bindings;
+use super::builtin;
+use super::source::{Mapped, Sources};
+use crate::explain::Finding;
+use crate::front::Fault;
+use crate::suggest;
+
+/// A diagnostic for what naga found in the text of a stage.
+pub fn of_stage(sources: &Sources<'_, '_>, stage: &Parsed, text: &Mapped, finding: Finding) -> Diagnostic {
+    let mut labels = finding.labels.into_iter();
+    let main = labels.next().map(|(range, _)| range);
+    let Some(place) = main.and_then(|range| text.origin(range)) else {
+        let mut diagnostic = Diagnostic::error(finding.message).in_file(&sources.files[stage.root].path);
+        diagnostic.notes = finding.notes;
+        return diagnostic;
+    };
+    let help = help(sources, stage, &finding.message, place.file, place.start);
+    let mut diagnostic = sources.error(place, finding.message);
+    diagnostic.notes.splice(0..0, finding.notes);
+    diagnostic.help = help;
+    diagnostic
+}
+
+fn help(
+    sources: &Sources<'_, '_>,
+    stage: &Parsed,
+    message: &str,
+    file: usize,
+    start: usize,
+) -> Option<String> {
+    let named = message.split('`').nth(1).unwrap_or_default();
+    let words = || stage.tokens.iter().filter(|token| token.is_word()).map(|token| &*token.text);
+    let close = if message.starts_with("no variable") {
+        suggest::closest(named, words().chain(builtin::VARIABLES))
+    } else if message.starts_with("unknown function") {
+        suggest::closest(named, words().chain(builtin::FUNCTIONS))
+    } else if message.starts_with("no ") {
+        suggest::closest(named, words())
+    } else if message.starts_with("expected `;`") {
+        let text = &sources.files[file].text;
+        let before = text[..start].trim_end();
+        let line = Span::new(text, before.len()..before.len()).line;
+        return Some(format!("a `;` may be missing at the end of line {line}"));
+    } else if message.contains("x2` cannot stand in a struct") {
+        return Some("use `vec4`, or a matrix of 3 or 4 rows".to_owned());
+    } else {
+        None
+    };
+    close.map(|name| format!("did you mean `{name}`?"))
+}
+
+/// A diagnostic for what is wrong with the joined stages.
+pub fn of_program(
+    sources: &Sources<'_, '_>,
+    bindings: &Bindings,
+    joined: &str,
+    root: usize,
+    fault: Fault,
+) -> Diagnostic {
+    let Fault::Source(finding) = fault else { return of_fault(sources, root, fault) };
+    let named = finding.labels.iter().find_map(|(range, _)| {
+        let text = joined.get(range.clone())?;
+        let words = text.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
+        words.filter_map(|word| bindings.places.get(word)).next()
+    });
+    let Some(place) = named else {
+        let mut diagnostic = Diagnostic::error(finding.message).in_file(&sources.files[root].path);
+        diagnostic.notes = finding.notes;
+        return diagnostic;
+    };
+    let mut diagnostic = sources.error(*place, finding.message);
+    diagnostic.notes.splice(0..0, finding.notes);
+    diagnostic
+}
+
+/// A diagnostic for what has no place.
+pub fn of_fault(sources: &Sources<'_, '_>, root: usize, fault: Fault) -> Diagnostic {
+    let diagnostic = Diagnostic::error(fault.to_string()).in_file(&sources.files[root].path);
+    match fault {
+        Fault::TooDeep => {
+            diagnostic.with_help("split long expressions with variables, and use `switch` for long chains")
+        }
+        Fault::Internal(_) => diagnostic.with_help(
+            "this is a fault of the compiler, not only of the shader; undo the last edit to go on",
+        ),
+        _ => diagnostic,
+    }
+}

@@ -1,0 +1,583 @@
+//! Writes a stage as the GLSL that naga reads: types first, then globals with their groups, bindings and
+//! locations, then functions.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
+
+use super::Parsed;
+use super::bindings::{self, Bindings};
+use super::builtin;
+use super::check;
+use super::declare::{Block, Function, Item, Variable};
+use super::lex::{self, Kind, Token};
+use super::locations::{self, Interface, Passed};
+use super::rewrite::{Meaning, Member, Rewriter, Scene, Stored};
+use super::source::{Mapped, Place, Sources};
+use super::switch;
+use crate::Stage;
+use crate::names::{GROUPS, Group};
+
+/// What naga is given first. Of its versions this one takes most.
+const VERSION: &str = "#version 460 core\n";
+
+/// The author's `main`: another one calls it, because there is work before and after, and it may return
+/// early.
+pub const AUTHORS_MAIN: &str = "kiln_main";
+
+/// Writes `stage`; what cannot be written is left in `sources`.
+pub fn lower(
+    sources: &mut Sources<'_, '_>,
+    stage: &Parsed,
+    interface: &Interface,
+    bindings: &Bindings,
+    holders: &BTreeMap<Group, String>,
+) -> Mapped {
+    let scene = scene(stage);
+    let mut writer = Writer {
+        sources,
+        stage,
+        bindings,
+        scene,
+        types: Mapped::default(),
+        globals: Mapped::default(),
+        functions: Mapped::default(),
+        members: BTreeMap::new(),
+        samplers: BTreeSet::new(),
+        runtime: BTreeSet::new(),
+        prologue: Mapped::default(),
+        epilogue: Mapped::default(),
+    };
+    for item in &stage.items {
+        writer.item(item);
+    }
+    writer.holders(holders);
+    writer.interface(interface);
+    for item in &stage.items {
+        if let Item::Function(function) = item {
+            writer.function(function);
+        }
+    }
+    writer.finish()
+}
+
+struct Writer<'a, 's, 'r> {
+    sources: &'a mut Sources<'s, 'r>,
+    stage: &'a Parsed,
+    bindings: &'a Bindings,
+    scene: Scene,
+    types: Mapped,
+    globals: Mapped,
+    functions: Mapped,
+    /// Loose uniforms of this stage.
+    members: BTreeMap<Group, Vec<Variable>>,
+    /// Samplers written so far: several textures share one.
+    samplers: BTreeSet<String>,
+    /// Constants whose value only a running shader can compute.
+    runtime: BTreeSet<Rc<str>>,
+    /// What is done before the author's `main`.
+    prologue: Mapped,
+    /// What is done after it.
+    epilogue: Mapped,
+}
+
+/// Names that are written otherwise, and what else a function's text means.
+fn scene(stage: &Parsed) -> Scene {
+    let mut scene = Scene {
+        stage: stage.stage,
+        meanings: BTreeMap::new(),
+        structs: BTreeSet::new(),
+        functions: BTreeSet::new(),
+        textured: BTreeSet::new(),
+        polyfills: BTreeMap::new(),
+    };
+    for name in ["gl_VertexID", "gl_VertexIndex", "gl_InstanceID", "gl_InstanceIndex"] {
+        let texts = builtin::variable(name).unwrap_or_default().iter().map(|text| (*text).to_owned());
+        scene.meanings.insert(name.to_owned(), Meaning::Expression(texts.collect()));
+    }
+    let mut size = [1_u32; 3];
+    for item in &stage.items {
+        match item {
+            Item::Struct(structure) => drop(scene.structs.insert(Rc::clone(&structure.name.text))),
+            Item::Function(function) => {
+                scene.functions.insert(Rc::clone(&function.name.text));
+                let mut tokens = function.parameters.iter().flatten();
+                if tokens.any(|token| builtin::combined(&token.text).is_some()) {
+                    scene.textured.insert(Rc::clone(&function.name.text));
+                }
+            }
+            Item::Variable(variable) if variable.qualifiers.is("uniform") => {
+                let name = variable.name.text.to_string();
+                if let Some(combined) = builtin::combined(&variable.ty.text) {
+                    let sampler = bindings::sampler_name(variable, &combined);
+                    scene.meanings.insert(name, Meaning::Texture(combined, sampler));
+                } else if let (_, Some(stored)) = stored_type(variable) {
+                    scene.meanings.insert(name, Meaning::Stored(stored));
+                }
+            }
+            Item::Block(block) => block_meanings(&mut scene, stage, block),
+            Item::Qualifiers(qualifiers, _) => {
+                for (axis, name) in ["local_size_x", "local_size_y", "local_size_z"].iter().enumerate() {
+                    size[axis] = qualifiers.integer(name).unwrap_or(size[axis]);
+                }
+            }
+            _ => {}
+        }
+    }
+    let [x, y, z] = size.map(|count| format!("{count}u"));
+    let texts = ["uvec3", "(", &x, ",", &y, ",", &z, ")"].map(str::to_owned).to_vec();
+    scene.meanings.insert("gl_WorkGroupSize".to_owned(), Meaning::Expression(texts));
+    scene
+}
+
+fn block_meanings(scene: &mut Scene, stage: &Parsed, block: &Block) {
+    let is_passed = locations::direction(&block.qualifiers, stage.stage).is_some();
+    let is_uniform = block.qualifiers.is("uniform");
+    let mut members = BTreeMap::new();
+    for member in &block.members {
+        let name = member.name.text.to_string();
+        if is_passed {
+            members.insert(name, Member::Renamed(locations::member_name(&block.name, &member.name)));
+        } else if let (_, Some(stored)) = stored_type(member)
+            && is_uniform
+        {
+            if block.instance.is_none() {
+                scene.meanings.insert(name, Meaning::Stored(stored));
+            } else {
+                members.insert(name, Member::Stored(stored));
+            }
+        }
+    }
+    if let Some(instance) = &block.instance
+        && !members.is_empty()
+    {
+        scene.meanings.insert(instance.text.to_string(), Meaning::Instance(members));
+    }
+}
+
+/// The type that a uniform is stored as, and how its uses are written if that is another.
+fn stored_type(variable: &Variable) -> (String, Option<Stored>) {
+    let ty = &*variable.ty.text;
+    let is_array = !variable.array.is_empty();
+    let len =
+        builtin::vector_len(ty).or_else(|| matches!(ty, "float" | "int" | "uint" | "bool").then_some(1));
+    let Some(len) = len else { return (ty.to_owned(), None) };
+    let is_flag = ty.starts_with('b');
+    let kind = match ty.as_bytes().first() {
+        Some(b'b' | b'u') => "u",
+        Some(b'i') => "i",
+        _ => "",
+    };
+    let swizzle = match len {
+        1 => Some("x"),
+        2 => Some("xy"),
+        3 if is_flag => Some("xyz"),
+        _ => None,
+    };
+    let stored = Stored { swizzle: swizzle.filter(|_| is_array), flags: is_flag.then_some(len) };
+    if stored == Stored::default() {
+        return (ty.to_owned(), None);
+    }
+    let stored_len = if is_array { 4 } else { len };
+    let name = match (stored_len, kind) {
+        (1, _) => "uint".to_owned(),
+        (len, kind) => format!("{kind}vec{len}"),
+    };
+    (name, Some(stored))
+}
+
+fn put(out: &mut Mapped, tokens: &[Token]) {
+    for token in tokens {
+        out.push(&token.text, token.place);
+        out.push(if matches!(&*token.text, ";" | "{" | "}") { "\n" } else { " " }, token.place);
+    }
+}
+
+impl Writer<'_, '_, '_> {
+    fn report(&mut self, place: Place, message: impl Into<String>, help: impl Into<String>) {
+        let diagnostic = self.sources.error(place, message).with_help(help);
+        self.sources.diagnostics.push(diagnostic);
+    }
+
+    fn item(&mut self, item: &Item) {
+        match item {
+            Item::Struct(structure) => {
+                self.types.push("struct ", structure.name.place);
+                put(&mut self.types, std::slice::from_ref(&structure.name));
+                self.types.push("{\n", structure.name.place);
+                for member in &structure.members {
+                    check::struct_member(self.sources, member);
+                    let (ty, array) = (member.ty.clone(), member.array.clone());
+                    put(&mut self.types, &[vec![ty, member.name.clone()], array].concat());
+                    self.types.push(";\n", member.name.place);
+                }
+                self.types.push("};\n", structure.name.place);
+            }
+            Item::Variable(variable) => self.variable(variable),
+            Item::Block(block) => self.block(block),
+            Item::Qualifiers(qualifiers, names) => {
+                check::layouts(self.sources, qualifiers);
+                let place = qualifiers.layout.first().map(|layout| layout.name.place);
+                let place = place.or(names.first().map(|name| name.place));
+                let Some(place) = place else { return };
+                let invariant = names.iter().filter(|_| qualifiers.invariant.is_some());
+                let invariant: Vec<&Token> = invariant.filter(|name| name.is("gl_Position")).collect();
+                for name in invariant {
+                    self.globals.push("invariant gl_Position;\n", name.place);
+                }
+                let kept = qualifiers.layout.iter().filter(|layout| {
+                    layout.name.text.starts_with("local_size_") || layout.name.is("early_fragment_tests")
+                });
+                for layout in kept {
+                    let value: String = layout.value.iter().map(|token| &*token.text).collect();
+                    let value = if value.is_empty() { value } else { format!(" = {value}") };
+                    self.globals.push(&format!("layout({}{value}) in;\n", layout.name.text), place);
+                }
+            }
+            Item::Function(_) => {}
+            Item::Other(tokens) => put(&mut self.globals, tokens),
+        }
+    }
+
+    fn layout(&self, name: &str) -> String {
+        // What has no binding was refused already.
+        let (group, binding) = self.bindings.of.get(name).copied().unwrap_or_default();
+        format!("set = {group}, binding = {binding}")
+    }
+
+    fn variable(&mut self, variable: &Variable) {
+        check::layouts(self.sources, &variable.qualifiers);
+        check::type_name(self.sources, &variable.ty);
+        let is_built_in = variable.name.text.starts_with("gl_");
+        match variable.qualifiers.storage.as_ref().map(|storage| &*storage.text) {
+            _ if is_built_in => {}
+            Some("uniform") => self.uniform(variable),
+            Some("const") => self.constant(variable),
+            Some("in" | "out" | "attribute" | "varying") => {}
+            storage => {
+                let mut qualifier: Vec<Token> = variable.qualifiers.storage.iter().cloned().collect();
+                qualifier.retain(|_| storage == Some("shared"));
+                self.global(variable, qualifier);
+            }
+        }
+    }
+
+    /// A variable of this stage alone. naga forgets initial values that are not constant: `main` gives them.
+    fn global(&mut self, variable: &Variable, mut tokens: Vec<Token>) {
+        let (ty, name) = (variable.ty.clone(), variable.name.clone());
+        let rewritten = self.with_length(variable);
+        tokens.extend([ty, name].into_iter().chain(rewritten));
+        put(&mut self.globals, &tokens);
+        self.globals.push(";\n", variable.place());
+        let Some(initial) = &variable.initial else { return };
+        if initial[0].is("{") {
+            let message = format!("`{}` is initialised with a list", variable.name.text);
+            return self.report(initial[0].place, message, "write a constructor, as in `float[2](1.0, 2.0)`");
+        }
+        let value = Rewriter::new(self.sources, &mut self.scene, None).tokens(initial);
+        let mark = |text: &str| Token::new(Kind::Mark, text, variable.place());
+        let assignment = [variable.name.clone(), mark("=")].into_iter().chain(value).chain([mark(";")]);
+        put(&mut self.prologue, &assignment.collect::<Vec<Token>>());
+    }
+
+    /// `[…]` of a variable, with the length that its initial value has.
+    fn with_length(&mut self, variable: &Variable) -> Vec<Token> {
+        let Some(initial) = &variable.initial else { return variable.array.clone() };
+        let equals = Token::new(Kind::Mark, "=", variable.place());
+        let tokens: Vec<Token> = variable.array.iter().chain([&equals]).chain(initial).cloned().collect();
+        let count = self.sources.diagnostics.len();
+        let written = Rewriter::new(self.sources, &mut self.scene, None).tokens(&tokens);
+        // The initial value is rewritten once more where it is kept, and reports its faults there.
+        self.sources.diagnostics.truncate(count);
+        let len = written.iter().position(|token| token.is("=")).unwrap_or(0);
+        written[..len].to_vec()
+    }
+
+    fn constant(&mut self, variable: &Variable) {
+        let initial = variable.initial.clone().unwrap_or_default();
+        let is_runtime = initial.windows(2).any(|pair| {
+            let name = &pair[0];
+            let is_type = builtin::is_value_type(&name.text) || self.scene.structs.contains(&name.text);
+            name.is_word() && pair[1].is("(") && !is_type
+        }) || initial.iter().any(|token| self.runtime.contains(&token.text));
+        if is_runtime && variable.qualifiers.layout.is_empty() {
+            self.runtime.insert(Rc::clone(&variable.name.text));
+            return self.global(variable, Vec::new());
+        }
+        let place = variable.place();
+        if let Some(id) = variable.qualifiers.integer("constant_id") {
+            self.types.push(&format!("layout(constant_id = {id}) "), place);
+        }
+        self.types.push("const ", place);
+        let array = self.with_length(variable);
+        put(&mut self.types, &[vec![variable.ty.clone(), variable.name.clone()], array].concat());
+        if !initial.is_empty() {
+            self.types.push("= ", place);
+            let value = Rewriter::new(self.sources, &mut self.scene, None).tokens(&initial);
+            put(&mut self.types, &value);
+        }
+        self.types.push(";\n", place);
+    }
+
+    fn uniform(&mut self, variable: &Variable) {
+        let (name, place) = (&*variable.name.text, variable.place());
+        if builtin::is_opaque(&variable.ty.text) {
+            if let Some(bracket) = variable.array.first() {
+                let message = format!("`{name}` is an array of textures, which devices need not have");
+                return self.report(
+                    bracket.place,
+                    message,
+                    "declare each texture by itself, or use a texture array as `sampler2DArray`",
+                );
+            }
+            return self.opaque(variable);
+        }
+        if let Some(initial) = variable.initial.as_ref().and_then(|initial| initial.first()) {
+            let message = format!("the initial value of `{name}` is not kept");
+            let help = "WGSL has no initial values of uniforms: set it from outside, or make it a `const`";
+            let warning = self.sources.warning(initial.place, message).with_help(help);
+            self.sources.diagnostics.push(warning);
+        }
+        check::uniform_type(self.sources, self.stage, variable);
+        match bindings::holder(variable) {
+            Some(group) if self.stage.count(name) > 1 => {
+                self.members.entry(group).or_default().push(variable.clone());
+            }
+            // Nobody reads it.
+            Some(_) => {}
+            None => {
+                let layout = self.layout(name);
+                self.globals.push(&format!("layout({layout}) uniform "), place);
+                put(&mut self.globals, &[variable.ty.clone(), variable.name.clone()]);
+                self.globals.push(";\n", place);
+            }
+        }
+    }
+
+    fn opaque(&mut self, variable: &Variable) {
+        let (name, place) = (&*variable.name.text, variable.place());
+        let layout = self.layout(name);
+        let Some(combined) = builtin::combined(&variable.ty.text) else {
+            let format = variable.qualifiers.layout.iter().find(|layout| check::is_format(&layout.name.text));
+            let format = format.map_or(String::new(), |format| format!("{}, ", format.name.text));
+            let access = check::image_access(self.sources, self.stage, variable);
+            self.globals.push(&format!("layout({format}{layout}) {access} uniform "), place);
+            put(&mut self.globals, &[variable.ty.clone(), variable.name.clone()]);
+            return self.globals.push(";\n", place);
+        };
+        let text = format!("layout({layout}) uniform {} {name};\n", combined.texture);
+        self.globals.push(&text, place);
+        let sampler = bindings::sampler_name(variable, &combined);
+        if self.samplers.insert(sampler.clone()) {
+            let layout = self.layout(&sampler);
+            let text = format!("layout({layout}) uniform {} {sampler};\n", combined.sampler);
+            self.globals.push(&text, place);
+        }
+    }
+
+    fn block(&mut self, block: &Block) {
+        let place = block.name.place;
+        if locations::direction(&block.qualifiers, self.stage.stage).is_some() {
+            return;
+        }
+        check::layouts(self.sources, &block.qualifiers);
+        if let Some(bracket) = block.array.first() {
+            let message = format!("`{}` is an array of blocks", block.name.text);
+            return self.report(bracket.place, message, "declare an array inside of one block");
+        }
+        let is_uniform = block.qualifiers.is("uniform");
+        let layout = self.layout(&bindings::block_name(block));
+        let (packing, access) =
+            if is_uniform { ("std140", "") } else { ("std430", check::buffer_access(block)) };
+        let keyword = if is_uniform { "uniform" } else { "buffer" };
+        // naga takes members of a block for globals even if there is an instance: a struct has none.
+        let head = match &block.instance {
+            Some(_) => "struct ".to_owned(),
+            None => format!("layout({packing}, {layout}) {access} {keyword} "),
+        };
+        self.globals.push(&head, place);
+        put(&mut self.globals, std::slice::from_ref(&block.name));
+        self.globals.push("{\n", place);
+        for member in &block.members {
+            check::layouts(self.sources, &member.qualifiers);
+            check::block_member(self.sources, self.stage, member, is_uniform);
+            self.member(member, is_uniform);
+        }
+        self.globals.push("};\n", place);
+        if let Some(instance) = &block.instance {
+            self.globals.push(&format!("layout({layout}) {access} {keyword} "), instance.place);
+            put(&mut self.globals, &[block.name.clone(), instance.clone()]);
+            self.globals.push(";\n", instance.place);
+        }
+    }
+
+    fn member(&mut self, member: &Variable, is_uniform: bool) {
+        let ty = if is_uniform { stored_type(member).0 } else { member.ty.text.to_string() };
+        let ty = Token::new(Kind::Word, ty, member.ty.place);
+        put(&mut self.globals, &[vec![ty, member.name.clone()], member.array.clone()].concat());
+        self.globals.push(";\n", member.name.place);
+    }
+
+    /// Blocks of loose uniforms.
+    fn holders(&mut self, names: &BTreeMap<Group, String>) {
+        for group in GROUPS {
+            let Some(members) = self.members.remove(&group) else { continue };
+            let place = members[0].place();
+            let layout = self.layout(group.block());
+            let name = names.get(&group).map_or(group.block(), String::as_str);
+            self.globals.push(&format!("layout(std140, {layout}) uniform {name} {{\n"), place);
+            for member in &members {
+                self.member(member, true);
+            }
+            self.globals.push("};\n", place);
+        }
+    }
+
+    fn interface(&mut self, interface: &Interface) {
+        for (word, side) in [("in", &interface.inputs), ("out", &interface.outputs)] {
+            for passed in side {
+                self.passed(passed, word);
+            }
+        }
+        let bodies = self.stage.items.iter().filter_map(|item| match item {
+            Item::Function(function) => function.body.as_ref(),
+            _ => None,
+        });
+        let size = bodies.flatten().find(|token| token.is("gl_PointSize"));
+        if let Some(place) = size.map(|token| token.place).filter(|_| self.stage.stage == Stage::Vertex) {
+            let warning = self.sources.warning(place, "`gl_PointSize` has no effect: points have one pixel");
+            self.sources.diagnostics.push(warning.with_help("draw a quad for each point"));
+            self.globals.push("float gl_PointSize;\n", place);
+        }
+    }
+
+    fn passed(&mut self, passed: &Passed, word: &str) {
+        let (place, location) = (passed.name.place, passed.location.unwrap_or(0));
+        let interpolation: String =
+            passed.interpolation.iter().map(|token| format!("{} ", token.text)).collect();
+        let Some(columns) = builtin::columns(&passed.ty.text) else {
+            self.globals.push(&format!("layout(location = {location}) {interpolation}{word} "), place);
+            let declared = [vec![passed.ty.clone(), passed.name.clone()], passed.array.clone()].concat();
+            put(&mut self.globals, &declared);
+            return self.globals.push(";\n", place);
+        };
+        if let Some(bracket) = passed.array.first() {
+            let message =
+                format!("`{}` is an array of matrices that passes between stages", passed.name.text);
+            return self.report(bracket.place, message, "pass each matrix by itself");
+        }
+        // WGSL passes vectors only: the matrix becomes a variable, and its columns pass.
+        let (matrix, name) = (&passed.ty.text, &passed.name.text);
+        let rows = matrix.rsplit(['t', 'x']).next().unwrap_or("4");
+        let names: Vec<String> = (0..columns).map(|column| format!("{name}_column_{column}")).collect();
+        self.globals.push(&format!("{matrix} {name};\n"), place);
+        for (location, column) in (location..).zip(&names) {
+            let text = format!("layout(location = {location}) {interpolation}{word} vec{rows} {column};\n");
+            self.globals.push(&text, place);
+        }
+        if word == "in" {
+            self.prologue.push(&format!("{name} = {matrix}({});\n", names.join(", ")), place);
+        } else {
+            for (index, column) in names.iter().enumerate() {
+                self.epilogue.push(&format!("{column} = {name}[{index}];\n"), place);
+            }
+        }
+    }
+
+    fn function(&mut self, function: &Function) {
+        let place = function.name.place;
+        let result: Vec<Token> =
+            function.result.iter().filter(|token| !check::is_dropped(token)).cloned().collect();
+        result.iter().for_each(|token| check::type_name(self.sources, token));
+        let returned = result.last().map(|token| Rc::clone(&token.text));
+        let mut rewriter = Rewriter::new(self.sources, &mut self.scene, returned);
+        let parameters: Vec<Vec<Token>> =
+            function.parameters.iter().map(|parameter| rewriter.parameter(parameter)).collect();
+        let body = function.body.as_ref().map(|body| switch::without_fall_through(rewriter.sources, body));
+        let body = body.map(|body| rewriter.tokens(&body));
+        put(&mut self.functions, &result);
+        let name = if function.name.is("main") { AUTHORS_MAIN } else { &*function.name.text };
+        self.functions.push(name, place);
+        self.functions.push("(", place);
+        for (index, parameter) in parameters.iter().enumerate() {
+            if index > 0 {
+                self.functions.push(", ", place);
+            }
+            parameter.iter().for_each(|token| check::type_name(self.sources, token));
+            put(&mut self.functions, parameter);
+        }
+        self.functions.push(")", place);
+        match body {
+            None => self.functions.push(";\n", place),
+            Some(body) => put(&mut self.functions, &body),
+        }
+    }
+
+    fn finish(self) -> Mapped {
+        let start = Place { file: self.stage.root, start: 0, end: 0 };
+        let mut text = Mapped::default();
+        text.push(VERSION, start);
+        text.append(self.types);
+        text.append(self.globals);
+        for (name, place) in self.scene.polyfills {
+            text.push(&builtin::polyfill(name).unwrap_or_default(), place);
+        }
+        text.append(self.functions);
+        text.push("void main() {\n", start);
+        text.append(self.prologue);
+        text.push(&format!("{AUTHORS_MAIN}();\n"), start);
+        text.append(self.epilogue);
+        text.push("}\n", start);
+        text
+    }
+}
+
+/// Names for the structs of the blocks that hold loose uniforms, which no author uses.
+pub fn holder_names(stages: &[Parsed]) -> BTreeMap<Group, String> {
+    let names = [
+        (Group::Frame, "Frame"),
+        (Group::Material, "Material"),
+        (Group::Draw, "Draw"),
+        (Group::Params, "Params"),
+    ];
+    let unused = |mut name: String| {
+        while stages.iter().any(|stage| stage.count(&name) > 0) {
+            name.push_str("Uniforms");
+        }
+        name
+    };
+    names.into_iter().map(|(group, name)| (group, unused(format!("{name}Uniforms")))).collect()
+}
+
+/// Whether brackets pair up and nothing is nested too deep for naga.
+pub fn check_nesting(sources: &mut Sources<'_, '_>, tokens: &[Token]) -> bool {
+    let mut text = Mapped::default();
+    put(&mut text, tokens);
+    let plain = crate::token::tokenize(&text.text).unwrap_or_default();
+    let Err(fault) = crate::limits::check_nesting(&text.text, &plain) else { return true };
+    let Some(place) = text.origin(fault.range) else { return false };
+    let mut diagnostic = sources.error(place, &fault.message);
+    if let Some(opened) = fault.opened.and_then(|opened| text.origin(opened)) {
+        diagnostic.notes.insert(0, format!("opened at {}", sources.describe(opened)));
+    } else if fault.message.starts_with("expression") {
+        diagnostic.help =
+            Some("split it with a variable, or end an `else if` chain with `switch`".to_owned());
+    }
+    sources.diagnostics.push(diagnostic);
+    false
+}
+
+/// Whether all tokens are GLSL's.
+pub fn check_characters(sources: &mut Sources<'_, '_>, tokens: &[Token]) -> bool {
+    let known = |token: &&Token| token.kind != Kind::Mark || is_mark(&token.text);
+    let Some(wrong) = tokens.iter().find(|token| !known(token)) else { return true };
+    let fault = sources.error(wrong.place, format!("`{}` is no character of GLSL here", wrong.text));
+    sources.diagnostics.push(fault);
+    false
+}
+
+fn is_mark(text: &str) -> bool {
+    text.is_ascii()
+        && !["##", "::", "->", "#", "@", "$", "`", "\"", "'", "\\"].contains(&text)
+        && !text.bytes().any(|byte| byte.is_ascii_control())
+        && lex::tokenize(0, text).is_ok()
+}

@@ -1,0 +1,575 @@
+//! Rewrites expressions and statements to what naga reads. One pass over the tokens of a function, with the
+//! scopes of local names, because a local may hide what would be rewritten.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
+
+use kiln_diagnostic::Diagnostic;
+
+use super::builtin::{self, Combined};
+use super::declare::{self, DROPPED};
+use super::lex::{self, Kind, Token};
+use super::source::{Place, Sources};
+use crate::Stage;
+
+/// How the use of a global name is written for naga.
+#[derive(Clone, Debug)]
+pub enum Meaning {
+    /// A combined texture: both parts, by the name of its sampler.
+    Texture(Combined, String),
+    /// A uniform that is stored as another type.
+    Stored(Stored),
+    /// The instance of a block, with members that are written otherwise.
+    Instance(BTreeMap<String, Member>),
+    /// Another expression.
+    Expression(Vec<String>),
+}
+
+/// How the use of a block's member is written.
+#[derive(Clone, Debug)]
+pub enum Member {
+    /// A variable of its own.
+    Renamed(String),
+    /// Stored as another type.
+    Stored(Stored),
+}
+
+/// A uniform that cannot be stored as what it is: truth values, and arrays of less than four components.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Stored {
+    /// The components that are used of each array element.
+    pub swizzle: Option<&'static str>,
+    /// How many truth values are stored as numbers.
+    pub flags: Option<u32>,
+}
+
+/// What a stage knows while its functions are rewritten.
+#[derive(Debug)]
+pub struct Scene {
+    /// The stage.
+    pub stage: Stage,
+    /// Global names that are written otherwise.
+    pub meanings: BTreeMap<String, Meaning>,
+    /// Names of structs.
+    pub structs: BTreeSet<Rc<str>>,
+    /// Names of functions.
+    pub functions: BTreeSet<Rc<str>>,
+    /// Those that take a combined texture.
+    pub textured: BTreeSet<Rc<str>>,
+    /// Functions to define, with the place of their first use.
+    pub polyfills: BTreeMap<&'static str, Place>,
+}
+
+/// What a local name is.
+#[derive(Clone, Debug)]
+enum Local {
+    Plain,
+    Texture(Combined, String),
+}
+
+/// Rewrites a function's parameters and body, or an initialiser: `result` is the type it gives.
+pub struct Rewriter<'a, 's, 'r> {
+    /// Where faults are left.
+    pub sources: &'a mut Sources<'s, 'r>,
+    scene: &'a mut Scene,
+    scopes: Vec<BTreeMap<Rc<str>, Local>>,
+    /// Locals whose name holds from some token on.
+    pending: BTreeMap<usize, Vec<Rc<str>>>,
+    /// Index after a `for` statement, where its scope ends.
+    loops: Vec<usize>,
+    /// What is called by each open parenthesis.
+    calls: Vec<Option<Rc<str>>>,
+    /// Text before a token.
+    before: BTreeMap<usize, Vec<Token>>,
+    /// Text in place of a token.
+    instead: BTreeMap<usize, Vec<Token>>,
+    result: Option<Rc<str>>,
+    out: Vec<Token>,
+}
+
+fn tokens_of(texts: &[&str], place: Place) -> Vec<Token> {
+    texts.iter().map(|text| Token::new(kind_of(text), *text, place)).collect()
+}
+
+fn kind_of(text: &str) -> Kind {
+    match text.bytes().next() {
+        Some(byte) if byte.is_ascii_digit() => Kind::Number,
+        Some(byte) if byte.is_ascii_alphabetic() || byte == b'_' => Kind::Word,
+        _ => Kind::Mark,
+    }
+}
+
+impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
+    /// For one function or initialiser.
+    pub fn new(sources: &'a mut Sources<'s, 'r>, scene: &'a mut Scene, result: Option<Rc<str>>) -> Self {
+        Rewriter {
+            sources,
+            scene,
+            scopes: vec![BTreeMap::new()],
+            pending: BTreeMap::new(),
+            loops: Vec::new(),
+            calls: Vec::new(),
+            before: BTreeMap::new(),
+            instead: BTreeMap::new(),
+            result,
+            out: Vec::new(),
+        }
+    }
+
+    fn report(&mut self, place: Place, message: impl Into<String>, help: impl Into<String>) {
+        let diagnostic: Diagnostic = self.sources.error(place, message).with_help(help);
+        self.sources.diagnostics.push(diagnostic);
+    }
+
+    /// Rewrites a parameter: combined textures become two.
+    pub fn parameter(&mut self, tokens: &[Token]) -> Vec<Token> {
+        let kept: Vec<&Token> = tokens.iter().filter(|token| !DROPPED.contains(&&*token.text)).collect();
+        // A copy that nobody may change is a copy all the same.
+        let is_copy = kept.iter().any(|token| token.is("in"))
+            || !kept.iter().any(|token| token.is("out") || token.is("inout"));
+        let kept: Vec<Token> = kept
+            .into_iter()
+            .filter(|token| !(is_copy && (token.is("const") || token.is("in"))))
+            .cloned()
+            .collect();
+        let Some(at) = kept.iter().position(|token| !["out", "inout"].contains(&&*token.text)) else {
+            return kept;
+        };
+        let rest = &kept[at + 1..];
+        let name = rest.get(declare::array_len(rest)).filter(|name| name.is_word());
+        let combined = builtin::combined(&kept[at].text);
+        if let Some(name) = name {
+            let local = match &combined {
+                Some(combined) => Local::Texture(combined.clone(), format!("{}_sampler", name.text)),
+                None => Local::Plain,
+            };
+            self.declare(&name.text, local);
+        }
+        let Some(combined) = combined else { return kept };
+        let ty = &kept[at];
+        if rest.iter().any(|token| token.is("[")) {
+            self.report(
+                ty.place,
+                "arrays of textures are not supported",
+                "pass each texture by itself, or use a texture array",
+            );
+        }
+        let (name, place) = (name.map_or("unused", |name| &*name.text), name.unwrap_or(ty).place);
+        let sampler = format!("{name}_sampler");
+        tokens_of(&[&combined.texture, name, ",", combined.sampler, &sampler], place)
+    }
+
+    fn declare(&mut self, name: &Rc<str>, local: Local) {
+        if let Some(scope) = self.scopes.last_mut() {
+            scope.insert(Rc::clone(name), local);
+        }
+    }
+
+    fn local(&self, name: &str) -> Option<&Local> {
+        self.scopes.iter().rev().find_map(|scope| scope.get(name))
+    }
+
+    /// Rewrites statements or an expression.
+    pub fn tokens(mut self, tokens: &[Token]) -> Vec<Token> {
+        for at in 0..tokens.len() {
+            self.loops.retain(|end| {
+                if *end <= at {
+                    self.scopes.pop();
+                }
+                *end > at
+            });
+            for name in self.pending.remove(&at).unwrap_or_default() {
+                self.declare(&name, Local::Plain);
+            }
+            if let Some(before) = self.before.remove(&at) {
+                self.out.extend(before);
+            }
+            match self.instead.remove(&at) {
+                Some(instead) => self.out.extend(instead),
+                None => self.token(tokens, at),
+            }
+        }
+        if let Some(last) = self.before.remove(&tokens.len()) {
+            self.out.extend(last);
+        }
+        self.out
+    }
+
+    fn token(&mut self, tokens: &[Token], at: usize) {
+        let token = &tokens[at];
+        match (&*token.text, token.kind) {
+            ("{", _) => self.scopes.push(BTreeMap::new()),
+            ("}", _) => drop(self.scopes.pop()),
+            ("(", _) => {
+                let callee =
+                    at.checked_sub(1).map(|before| &tokens[before]).filter(|callee| callee.is_word());
+                self.calls.push(callee.map(|callee| Rc::clone(&callee.text)));
+            }
+            (")", _) => drop(self.calls.pop()),
+            ("[", _) if tokens.get(at + 1).is_some_and(|next| next.is("]")) => self.unsized_array(tokens, at),
+            (text, Kind::Number) if text.ends_with("lf") || text.ends_with("LF") => {
+                let single = &text[..text.len() - 2];
+                self.report(
+                    token.place,
+                    format!("`{text}` is a double"),
+                    format!("write `{single}`: there are no doubles in WGSL"),
+                );
+            }
+            (_, Kind::Word) => return self.word(tokens, at),
+            _ => {}
+        }
+        self.out.push(token.clone());
+    }
+
+    fn word(&mut self, tokens: &[Token], at: usize) {
+        let token = &tokens[at];
+        let after_dot = at.checked_sub(1).is_some_and(|before| tokens[before].is("."));
+        let is_call = tokens.get(at + 1).is_some_and(|next| next.is("("));
+        let text = &*token.text;
+        if after_dot {
+            self.out.push(token.clone());
+            return;
+        }
+        match text {
+            "for" => self.open_loop(tokens, at),
+            "do" => self.check_do(tokens, at),
+            "discard" if self.scene.stage != Stage::Fragment => {
+                self.report(
+                    token.place,
+                    "`discard` stands outside of a fragment stage",
+                    "move it to the fragment stage",
+                );
+            }
+            "return" => self.convert_returned(tokens, at),
+            _ if DROPPED.contains(&text) => return,
+            _ => {}
+        }
+        if self.is_declaration(tokens, at) {
+            self.declaration(tokens, at);
+        } else if self.local(text).is_none() && self.scene.functions.contains(text) && is_call {
+            // The author's function hides what GLSL has of the same name.
+        } else if self.rewritten(tokens, at, is_call) {
+            return;
+        }
+        self.out.push(token.clone());
+    }
+
+    /// Whether the name at `at` was written in another way, or left out.
+    fn rewritten(&mut self, tokens: &[Token], at: usize, is_call: bool) -> bool {
+        let token = &tokens[at];
+        if let Some(local) = self.local(&token.text).cloned() {
+            if let Local::Texture(combined, sampler) = local {
+                self.texture(tokens, at, &combined, &sampler);
+                return true;
+            }
+            return false;
+        }
+        match self.scene.meanings.get(&*token.text).cloned() {
+            Some(Meaning::Texture(combined, sampler)) => self.texture(tokens, at, &combined, &sampler),
+            Some(Meaning::Stored(stored)) => self.stored(tokens, at, at, stored),
+            Some(Meaning::Instance(members)) => return self.instance(tokens, at, &members),
+            Some(Meaning::Expression(texts)) => {
+                let texts: Vec<&str> = texts.iter().map(String::as_str).collect();
+                self.out.extend(tokens_of(&texts, token.place));
+            }
+            None if is_call => return self.call(tokens, at),
+            None => {
+                self.check_variable(token);
+                return false;
+            }
+        }
+        true
+    }
+
+    fn check_variable(&mut self, token: &Token) {
+        let text = &*token.text;
+        if let Some(help) = builtin::replacement(text) {
+            self.report(token.place, format!("`{text}` is not supported"), help);
+        } else if text.starts_with("gl_") && !builtin::VARIABLES.contains(&text) {
+            let close = crate::suggest::closest(text, builtin::VARIABLES.into_iter());
+            let help = close
+                .map_or("the built-in variables are listed in docs/shader-interface.md".to_owned(), |name| {
+                    format!("did you mean `{name}`?")
+                });
+            self.report(token.place, format!("there is no built-in variable `{text}`"), help);
+        }
+    }
+
+    /// A combined texture: both parts for a function of the author's, joined for GLSL's own.
+    fn texture(&mut self, tokens: &[Token], at: usize, combined: &Combined, sampler: &str) {
+        let (token, place) = (&tokens[at], tokens[at].place);
+        let is_argument =
+            at.checked_sub(1).is_some_and(|before| ["(", ","].iter().any(|mark| tokens[before].is(mark)))
+                && tokens.get(at + 1).is_some_and(|next| [")", ","].iter().any(|mark| next.is(mark)));
+        let callee = self.calls.last().cloned().flatten().filter(|_| is_argument);
+        match callee {
+            None if tokens.get(at + 1).is_some_and(|next| next.is("[")) => {
+                self.report(
+                    place,
+                    format!("`{}` is no array", token.text),
+                    "arrays of textures are not supported",
+                );
+            }
+            None => self.report(
+                place,
+                format!("the texture `{}` has no value", token.text),
+                "pass it to a function, as in `texture(name, uv)`",
+            ),
+            Some(callee) if self.scene.textured.contains(&callee) => {
+                self.out.extend(tokens_of(&[&token.text, ",", sampler], place));
+            }
+            Some(_) => {
+                let texts = [&*combined.constructor, "(", &token.text, ",", sampler, ")"];
+                self.out.extend(tokens_of(&texts, place));
+            }
+        }
+    }
+
+    /// A uniform whose name ends at token `last`, and which is stored as another type.
+    fn stored(&mut self, tokens: &[Token], first: usize, last: usize, stored: Stored) {
+        let place = tokens[first].place.to(tokens[last].place);
+        let mut end = last + 1;
+        if tokens.get(end).is_some_and(|next| next.is("[")) {
+            end = lex::closing(tokens, end).map_or(end, |close| close + 1);
+        } else if stored.swizzle.is_some() && !tokens.get(end).is_some_and(|next| next.is(".")) {
+            self.report(
+                place,
+                format!("the array `{}` cannot be used as a whole", tokens[last].text),
+                "use its elements, or declare it as an array of `vec4`",
+            );
+        }
+        let name: Vec<Token> = tokens[first..=last].to_vec();
+        let swizzle = stored.swizzle.map(|swizzle| tokens_of(&[".", swizzle], place)).unwrap_or_default();
+        let after = match stored.flags {
+            Some(1) => tokens_of(&["!=", "0u", ")"], place),
+            Some(count) => tokens_of(&[",", &format!("uvec{count}"), "(", "0u", ")", ")"], place),
+            None => Vec::new(),
+        };
+        match stored.flags {
+            Some(1) => self.out.extend(tokens_of(&["("], place)),
+            Some(_) => self.out.extend(tokens_of(&["notEqual", "("], place)),
+            None => {}
+        }
+        self.out.extend(name);
+        let slot = self.before.entry(end).or_default();
+        // What is inner was opened later and closes first.
+        slot.splice(0..0, swizzle.into_iter().chain(after));
+        for inner in first + 1..=last {
+            self.instead.insert(inner, Vec::new());
+        }
+    }
+
+    fn instance(&mut self, tokens: &[Token], at: usize, members: &BTreeMap<String, Member>) -> bool {
+        let [_, dot, member, ..] = &tokens[at..] else { return false };
+        let Some(found) = members.get(&*member.text).filter(|_| dot.is(".")) else { return false };
+        match found {
+            Member::Renamed(name) => {
+                let mut token = member.clone();
+                token.text = Rc::from(name.as_str());
+                self.out.push(token);
+                self.instead.insert(at + 1, Vec::new());
+                self.instead.insert(at + 2, Vec::new());
+            }
+            Member::Stored(stored) => self.stored(tokens, at, at + 2, *stored),
+        }
+        true
+    }
+
+    /// A call of a function that is GLSL's own.
+    fn call(&mut self, tokens: &[Token], at: usize) -> bool {
+        let token = &tokens[at];
+        let Some(close) = lex::closing(tokens, at + 1) else { return false };
+        if builtin::MEMORY_BARRIERS.contains(&&*token.text) {
+            (at + 1..=close).for_each(|inner| drop(self.instead.insert(inner, Vec::new())));
+            return true;
+        }
+        let modern = builtin::modern(&token.text);
+        if modern.is_none() {
+            if let Some(help) = builtin::replacement(&token.text) {
+                self.report(token.place, format!("`{}` is not supported", token.text), help);
+                return false;
+            }
+        }
+        // The function is given its depth comparison as one number, older ones gave a colour.
+        if token.text.starts_with("shadow") && modern.is_some() {
+            self.out.extend(tokens_of(&["vec4", "("], token.place));
+            self.before.entry(close + 1).or_default().splice(0..0, tokens_of(&[")"], token.place));
+        }
+        let mut name = modern.map_or(&*token.text, |modern| modern).to_owned();
+        let count = lex::split_commas(&tokens[at + 2..close]).len();
+        let levelled = builtin::with_level(&name).filter(|(_, wanted)| *wanted == count);
+        if let Some((with_level, _)) = levelled.filter(|_| self.scene.stage != Stage::Fragment) {
+            name = with_level.to_owned();
+            self.before.entry(close).or_default().extend(tokens_of(&[",", "0.0"], token.place));
+        }
+        if let Some(function) = POLYFILLED.iter().find(|function| **function == name) {
+            self.scene.polyfills.entry(function).or_insert(token.place);
+            name.insert_str(0, "kiln_");
+        }
+        let mut call = token.clone();
+        call.text = Rc::from(name);
+        // The parenthesis that follows belongs to the written name.
+        self.out.push(call);
+        true
+    }
+
+    fn is_type(&self, word: &str) -> bool {
+        builtin::is_value_type(word) || self.scene.structs.contains(word)
+    }
+
+    /// Whether token `at` is the type of a declaration.
+    fn is_declaration(&self, tokens: &[Token], at: usize) -> bool {
+        let rest = &tokens[at + 1..];
+        let name = rest.get(declare::array_len(rest));
+        self.is_type(&tokens[at].text)
+            && self.local(&tokens[at].text).is_none()
+            && name.is_some_and(Token::is_word)
+    }
+
+    /// Notes the names that a declaration adds, and splits it where naga would go wrong.
+    fn declaration(&mut self, tokens: &[Token], at: usize) {
+        let type_array = declare::array_len(&tokens[at + 1..]);
+        let is_const = at.checked_sub(1).is_some_and(|before| tokens[before].is("const"));
+        let mut name = at + 1 + type_array;
+        loop {
+            let end = declarator_end(tokens, name);
+            self.instead.insert(name, vec![tokens[name].clone()]);
+            self.pending.entry(end).or_default().push(Rc::clone(&tokens[name].text));
+            if !tokens.get(end).is_some_and(|token| token.is(","))
+                || !tokens.get(end + 1).is_some_and(Token::is_word)
+            {
+                return;
+            }
+            // naga gives the array of one name to all that follow.
+            if tokens[name + 1].is("[") {
+                let place = tokens[end].place;
+                let mut again = tokens_of(if is_const { &[";", "const"] } else { &[";"] }, place);
+                again.extend(tokens[at..=at + type_array].iter().cloned());
+                self.instead.insert(end, again);
+            }
+            name = end + 1;
+        }
+    }
+
+    /// The scope of a `for` begins at its parenthesis and ends with its body.
+    fn open_loop(&mut self, tokens: &[Token], at: usize) {
+        let Some(close) = lex::closing(tokens, at + 1) else { return };
+        let end = match tokens.get(close + 1) {
+            Some(open) if open.is("{") => lex::closing(tokens, close + 1).map_or(tokens.len(), |end| end + 1),
+            _ => declarator_end_of_statement(tokens, close + 1),
+        };
+        self.scopes.push(BTreeMap::new());
+        self.loops.push(end);
+    }
+
+    /// naga jumps over the condition of `do … while` at a `continue`, for ever.
+    fn check_do(&mut self, tokens: &[Token], at: usize) {
+        if !tokens.get(at + 1).is_some_and(|open| open.is("{")) {
+            return;
+        }
+        let Some(close) = lex::closing(tokens, at + 1) else { return };
+        let mut inner = at + 2;
+        while inner < close {
+            let token = &tokens[inner];
+            if token.is("continue") {
+                self.report(
+                    token.place,
+                    "`continue` in a `do` loop is not supported",
+                    "write `while (true) { … if (!condition) break; }`, or put the rest under an `if`",
+                );
+            }
+            inner = if ["for", "while", "do"].iter().any(|word| token.is(word)) {
+                body_end(tokens, inner).unwrap_or(inner + 1).max(inner + 1)
+            } else {
+                inner + 1
+            };
+        }
+    }
+
+    /// naga does not convert what is returned: `return 0;` of a `float` becomes `return 0.0;`.
+    fn convert_returned(&mut self, tokens: &[Token], at: usize) {
+        let number = match &tokens[at + 1..] {
+            [number, end, ..] if end.is(";") => Some((at + 1, number)),
+            [minus, number, end, ..] if minus.is("-") && end.is(";") => Some((at + 2, number)),
+            _ => None,
+        };
+        let Some((index, number)) = number else { return };
+        let is_integer = number.kind == Kind::Number && number.text.bytes().all(|byte| byte.is_ascii_digit());
+        let suffix = match self.result.as_deref() {
+            Some("float") => ".0",
+            Some("uint") => "u",
+            _ => return,
+        };
+        if is_integer {
+            let text = format!("{}{suffix}", number.text);
+            self.instead.insert(index, vec![Token::new(Kind::Number, text, number.place)]);
+        }
+    }
+
+    /// `T[](…)`, `T a[] = T[](…)`, `T[] a = …`: counts the elements.
+    fn unsized_array(&mut self, tokens: &[Token], at: usize) {
+        let value = match &tokens[at + 2..] {
+            [open, ..] if open.is("(") => Some(at + 2),
+            [equals, ..] if equals.is("=") => Some(at + 3),
+            [name, equals, ..] if name.is_word() && equals.is("=") => Some(at + 4),
+            _ => None,
+        };
+        let Some(value) = value else { return };
+        let open = (value..tokens.len()).find(|at| tokens[*at].is("(") || tokens[*at].is("{"));
+        let elements = open.and_then(|open| Some(&tokens[open + 1..lex::closing(tokens, open)?]));
+        let is_list = tokens.get(value).is_some_and(|first| first.is("(") || first.is("{"))
+            || tokens.get(value + 1).is_some_and(|next| next.is("["));
+        match elements.filter(|_| is_list) {
+            Some(elements) => {
+                let count = lex::split_commas(elements).len().to_string();
+                self.before.entry(at + 1).or_default().push(Token::new(
+                    Kind::Number,
+                    count,
+                    tokens[at].place,
+                ));
+            }
+            None => self.report(
+                tokens[at].place,
+                "the length of this array is not known",
+                "write it between the brackets",
+            ),
+        }
+    }
+}
+
+/// Functions that are defined here when they are used.
+pub const POLYFILLED: [&str; 5] = ["isnan", "isinf", "modf", "outerProduct", "matrixCompMult"];
+
+/// The `,`, `;` or closing bracket after the declarator at `name`.
+fn declarator_end(tokens: &[Token], name: usize) -> usize {
+    let mut depth = 0_usize;
+    for (index, token) in tokens.iter().enumerate().skip(name) {
+        match &*token.text {
+            "(" | "[" | "{" => depth += 1,
+            ")" | "]" | "}" if depth == 0 => return index,
+            ")" | "]" | "}" => depth -= 1,
+            "," | ";" if depth == 0 => return index,
+            _ => {}
+        }
+    }
+    tokens.len()
+}
+
+/// Index after the next `;` outside of brackets.
+fn declarator_end_of_statement(tokens: &[Token], mut at: usize) -> usize {
+    while at < tokens.len() {
+        at = declarator_end(tokens, at);
+        if tokens.get(at).is_none_or(|token| !token.is(",")) {
+            return at + 1;
+        }
+        at += 1;
+    }
+    at
+}
+
+/// Index after the braces of the loop at `at`, if its body has braces.
+fn body_end(tokens: &[Token], at: usize) -> Option<usize> {
+    let open = if tokens[at].is("do") { at + 1 } else { lex::closing(tokens, at + 1)? + 1 };
+    tokens.get(open).filter(|token| token.is("{"))?;
+    Some(lex::closing(tokens, open)? + 1)
+}

@@ -1,0 +1,190 @@
+//! One stage through naga: lowered GLSL in, canonical WGSL out.
+
+use std::collections::BTreeMap;
+
+use naga::front::glsl::{Error, ErrorKind, ExpectedToken, Frontend, Options, TokenValue};
+use naga::{AddressSpace, Barrier, Block, Module, Statement, TypeInner};
+
+use super::{lower, stage};
+use crate::explain::Finding;
+use crate::front::{self, Fault};
+use crate::{Stage, canonical, describe};
+
+/// What naga made of a stage: its WGSL, or what is wrong.
+pub type Made = Result<String, Vec<Finding>>;
+
+/// Translates a stage. `names` are those of the variables at each group and binding.
+pub fn translate(text: &str, stage: Stage, names: &BTreeMap<(u32, u32), String>) -> Result<Made, Fault> {
+    front::on_deep_stack(Fault::Internal, || run(text, stage, names))
+}
+
+fn run(text: &str, stage: Stage, names: &BTreeMap<(u32, u32), String>) -> Result<Made, Fault> {
+    let options = Options::from(stage::for_naga(stage));
+    let mut module = match Frontend::default().parse(&options, text) {
+        Ok(module) => module,
+        Err(errors) => return Ok(Err(errors.errors.iter().map(|error| finding(text, error)).collect())),
+    };
+    name_variables(&mut module, stage, names);
+    name_members(&mut module);
+    module.functions.iter_mut().for_each(|(_, function)| repair(&mut function.body));
+    if let Err(error) = front::validate(&module) {
+        let mut finding = front::validation_finding(&module, &error);
+        finding.message = in_glsl(&finding.message);
+        finding.notes.iter_mut().for_each(|note| *note = in_glsl(note));
+        return Ok(Err(vec![finding]));
+    }
+    canonical::strip_unused(&mut module);
+    let info =
+        front::validate(&module).map_err(|error| Fault::Internal(format!("after compaction: {error:?}")))?;
+    canonical::emit(&module, &info).map(Ok).map_err(Fault::Internal)
+}
+
+/// Gives variables the names that Kiln binds by, and the entry point its own.
+fn name_variables(module: &mut Module, stage: Stage, names: &BTreeMap<(u32, u32), String>) {
+    let mut arguments: Vec<String> = Vec::new();
+    for entry in &mut module.entry_points {
+        stage::entry_point(stage).clone_into(&mut entry.name);
+        arguments.extend(entry.function.arguments.iter().filter_map(|argument| argument.name.clone()));
+    }
+    for (_, variable) in module.global_variables.iter_mut() {
+        if let Some(name) = variable.binding.and_then(|at| names.get(&(at.group, at.binding))) {
+            variable.name = Some(name.clone());
+        }
+        // naga copies each input to a variable; the input itself keeps the name.
+        let is_copy = variable.space == AddressSpace::Private
+            && variable.name.as_ref().is_some_and(|name| arguments.contains(name));
+        if is_copy && let Some(name) = &mut variable.name {
+            name.push_str("_in");
+        }
+    }
+    for (_, function) in module.functions.iter_mut() {
+        if function.name.as_deref() == Some(lower::AUTHORS_MAIN) {
+            let name = match stage {
+                Stage::Vertex => "vertex_main",
+                Stage::Fragment => "fragment_main",
+                Stage::Compute => "compute_main",
+            };
+            function.name = Some(name.to_owned());
+        }
+    }
+}
+
+/// Gives members of one struct different names: naga calls all elements of an array that is passed alike.
+fn name_members(module: &mut Module) {
+    let handles: Vec<_> = module.types.iter().map(|(handle, _)| handle).collect();
+    for handle in handles {
+        let mut ty = module.types[handle].clone();
+        let TypeInner::Struct { members, .. } = &mut ty.inner else { continue };
+        let names: Vec<Option<String>> = members.iter().map(|member| member.name.clone()).collect();
+        let mut renamed = false;
+        for (index, member) in members.iter_mut().enumerate() {
+            let is_repeated = names.iter().filter(|name| **name == member.name).count() > 1;
+            if let Some(name) = member.name.as_mut().filter(|_| is_repeated) {
+                let element = names[..index].iter().filter(|other| **other == names[index]).count();
+                name.push_str(&format!("_{element}"));
+                renamed = true;
+            }
+        }
+        if renamed {
+            module.types.replace(handle, ty);
+        }
+    }
+}
+
+/// Repairs two things of naga's: cases that end by `return` and the like are said to fall through, and
+/// `barrier()` asks for subgroups too.
+fn repair(block: &mut Block) {
+    for statement in block.iter_mut() {
+        match statement {
+            Statement::Block(inner) => repair(inner),
+            Statement::ControlBarrier(barrier) => barrier.remove(Barrier::SUB_GROUP),
+            Statement::If { accept, reject, .. } => {
+                repair(accept);
+                repair(reject);
+            }
+            Statement::Loop { body, continuing, .. } => {
+                repair(body);
+                repair(continuing);
+            }
+            Statement::Switch { cases, .. } => {
+                for case in cases {
+                    repair(&mut case.body);
+                    case.fall_through &= !ends(&case.body);
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+fn ends(block: &Block) -> bool {
+    match block.last() {
+        Some(Statement::Break | Statement::Continue | Statement::Return { .. } | Statement::Kill) => true,
+        Some(Statement::Block(inner)) => ends(inner),
+        Some(Statement::If { accept, reject, .. }) => ends(accept) && ends(reject),
+        _ => false,
+    }
+}
+
+/// naga's types in GLSL's words.
+fn in_glsl(message: &str) -> String {
+    let mut text = message.to_owned();
+    for (scalar, prefix) in [("f32", ""), ("i32", "i"), ("u32", "u"), ("bool", "b")] {
+        for len in 2..=4 {
+            text = text.replace(&format!("vec{len}<{scalar}>"), &format!("{prefix}vec{len}"));
+            for rows in 2..=4 {
+                text = text.replace(&format!("mat{len}x{rows}<{scalar}>"), &format!("mat{len}x{rows}"));
+            }
+        }
+    }
+    text.replace("`f32`", "`float`").replace("`i32`", "`int`").replace("`u32`", "`uint`")
+}
+
+fn finding(text: &str, error: &Error) -> Finding {
+    let range = error.meta.to_range();
+    let found = range.clone().and_then(|range| text.get(range)).unwrap_or("the end").to_owned();
+    let message = match &error.kind {
+        ErrorKind::EndOfFile => "unexpected end of the file".to_owned(),
+        ErrorKind::InvalidToken(_, expected) => {
+            let expected: Vec<String> = expected.iter().map(expected_text).collect();
+            format!("expected {}, found `{found}`", expected.join(" or "))
+        }
+        ErrorKind::UnknownVariable(name) => format!("no variable `{name}` in scope"),
+        ErrorKind::UnknownType(name) => format!("no type `{name}`"),
+        ErrorKind::UnknownField(name) => format!("no member `{name}`"),
+        ErrorKind::UnknownLayoutQualifier(name) => format!("layout `{name}` is not supported here"),
+        ErrorKind::VariableAlreadyDeclared(name) => format!("`{name}` is declared twice"),
+        ErrorKind::UnsupportedMatrixWithTwoRowsInStd140 { columns } => {
+            format!("`mat{columns}x2` cannot stand in a struct or uniform")
+        }
+        ErrorKind::NotImplemented(what) => format!("{what} is not supported"),
+        other => describe::clean(&other.to_string()).replace('\'', "`").replace('"', "`"),
+    };
+    let labels = range.map(|range| (range, String::new())).into_iter().collect();
+    Finding { message: in_glsl(&message), notes: Vec::new(), labels }
+}
+
+fn expected_text(expected: &ExpectedToken) -> String {
+    let ExpectedToken::Token(token) = expected else {
+        return expected.to_string().replace("identifier", "a name").replace("end of file", "a declaration");
+    };
+    let text = match token {
+        TokenValue::Semicolon => ";",
+        TokenValue::Comma => ",",
+        TokenValue::Colon => ":",
+        TokenValue::Assign => "=",
+        TokenValue::LeftBrace => "{",
+        TokenValue::RightBrace => "}",
+        TokenValue::LeftParen => "(",
+        TokenValue::RightParen => ")",
+        TokenValue::LeftBracket => "[",
+        TokenValue::RightBracket => "]",
+        TokenValue::While => "while",
+        TokenValue::Case => "case",
+        TokenValue::Default => "default",
+        TokenValue::Void => "void",
+        TokenValue::Struct => "struct",
+        other => return format!("{other:?}").to_lowercase(),
+    };
+    format!("`{text}`")
+}

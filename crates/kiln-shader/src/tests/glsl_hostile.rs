@@ -1,0 +1,1 @@
+//! GLSL nobody should write: limits give errors, mutations neither panic nor hang.

@@ -1,0 +1,5 @@
+#ifndef GUARDED
+#define GUARDED
+#include "guarded.glsl"
+float guarded() { return 1.0; }
+#endif

@@ -1,0 +1,1 @@
+vec4 sheen() { return vec4(FEATURE_SHEEN); }

@@ -1,0 +1,2 @@
+#version 300 es
+float shared_scale() { return 2.0; }

@@ -1,0 +1,3 @@
+#version 330
+layout(triangles) in;
+void main() { EmitVertex(); }

@@ -1,0 +1,3 @@
+#error from below
+#define JOIN(a, b) a ## b
+float y = JOIN(1., +);

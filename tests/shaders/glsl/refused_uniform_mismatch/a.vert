@@ -1,0 +1,3 @@
+#version 330
+uniform vec3 tint;
+void main() { gl_Position = vec4(tint, 1.0); }

@@ -1,0 +1,2 @@
+#pragma shader_stage(pixel)
+void main() {}
