@@ -59,7 +59,7 @@ pub fn assign(sources: &mut Sources<'_, '_>, stages: &[Parsed]) -> Bindings {
         for item in &stage.items {
             match item {
                 Item::Variable(variable) if variable.qualifiers.is("uniform") => {
-                    variable_wants(variable, &mut wanted)
+                    variable_wants(variable, &mut wanted);
                 }
                 Item::Block(block) if block.qualifiers.is("uniform") || block.qualifiers.is("buffer") => {
                     let name = block_name(block);
@@ -161,4 +161,16 @@ pub fn check_equal(sources: &mut Sources<'_, '_>, stages: &[Parsed]) {
             }
         }
     }
+}
+
+/// Where the stages declare the block, variable or struct `name`.
+pub fn places_of(stages: &[Parsed], name: &str) -> Vec<Place> {
+    let items = stages.iter().flat_map(|stage| &stage.items);
+    let places = items.filter_map(|item| match item {
+        Item::Block(block) if block_name(block) == name || block.name.is(name) => Some(block.name.place),
+        Item::Variable(variable) if variable.name.is(name) => Some(variable.place()),
+        Item::Struct(structure) if structure.name.is(name) => Some(structure.name.place),
+        _ => None,
+    });
+    places.collect()
 }

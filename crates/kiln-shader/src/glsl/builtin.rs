@@ -27,7 +27,7 @@ pub fn combined(ty: &str) -> Option<Combined> {
     } else {
         &["1D", "2D", "3D", "Cube", "2DArray", "CubeArray", "2DMS"]
     };
-    (shapes.contains(&shape) && !(is_shadow && !kind.is_empty())).then(|| Combined {
+    (shapes.contains(&shape) && (kind.is_empty() || !is_shadow)).then(|| Combined {
         constructor: ty.to_owned(),
         texture: format!("{kind}texture{shape}"),
         sampler: if is_shadow { "samplerShadow" } else { "sampler" },
@@ -130,6 +130,17 @@ fn component_product(size: usize) -> String {
     let terms = terms.join(", ");
     format!("mat{size} kiln_matrixCompMult(mat{size} a, mat{size} b) {{ return mat{size}({terms}); }}\n")
 }
+
+/// Whether the function compares with neighbouring pixels.
+pub fn is_derivative(name: &str) -> bool {
+    ["dFdx", "dFdy", "fwidth"].iter().any(|prefix| name.starts_with(prefix))
+}
+
+/// Types that people write most, for "did you mean".
+pub const TYPES: [&str; 20] = [
+    "bool", "float", "int", "uint", "vec2", "vec3", "vec4", "ivec2", "ivec3", "ivec4", "uvec2", "uvec3",
+    "uvec4", "bvec2", "bvec3", "bvec4", "mat2", "mat3", "mat4", "void",
+];
 
 /// Statements of memory order alone: a `barrier()` of WGSL orders memory too.
 pub const MEMORY_BARRIERS: [&str; 6] = [

@@ -95,6 +95,15 @@ pub fn type_name(sources: &mut Sources<'_, '_>, ty: &Token) {
     }
 }
 
+/// Checks the words of what is not understood.
+pub fn words(sources: &mut Sources<'_, '_>, tokens: &[Token]) {
+    for token in tokens {
+        if let Some(help) = builtin::replacement(&token.text) {
+            return report(sources, token.place, format!("`{}` is not supported", token.text), help);
+        }
+    }
+}
+
 /// Checks a member of any struct.
 pub fn struct_member(sources: &mut Sources<'_, '_>, member: &Variable) {
     type_name(sources, &member.ty);
@@ -106,7 +115,6 @@ pub fn struct_member(sources: &mut Sources<'_, '_>, member: &Variable) {
 
 /// Checks that a uniform's type can be stored.
 pub fn uniform_type(sources: &mut Sources<'_, '_>, stage: &Parsed, variable: &Variable) {
-    type_name(sources, &variable.ty);
     if variable.array.len() > 3 {
         let message = format!("`{}` is an array of arrays", variable.name.text);
         report(sources, variable.place(), message, "use one array, and compute the index");
@@ -144,10 +152,10 @@ fn is_narrow(ty: &str) -> bool {
 
 /// Checks a member of a block.
 pub fn block_member(sources: &mut Sources<'_, '_>, stage: &Parsed, member: &Variable, is_uniform: bool) {
+    type_name(sources, &member.ty);
     if is_uniform {
         return uniform_type(sources, stage, member);
     }
-    type_name(sources, &member.ty);
     if member.ty.is("bool") || member.ty.text.starts_with("bvec") {
         let message =
             format!("`{}` is `{}`, which cannot be stored in a buffer", member.name.text, member.ty.text);

@@ -227,6 +227,18 @@ pub fn array_len(tokens: &[Token]) -> usize {
     at
 }
 
+/// `[…][…]` in the other order: naga takes the last length for the outermost, GLSL the first.
+pub fn reversed(array: &[Token]) -> Vec<Token> {
+    let mut groups: Vec<&[Token]> = Vec::new();
+    let mut rest = array;
+    while let Some(close) = (!rest.is_empty()).then(|| lex::closing(rest, 0)).flatten() {
+        let (group, after) = rest.split_at(close + 1);
+        groups.push(group);
+        rest = after;
+    }
+    groups.into_iter().rev().flatten().cloned().collect()
+}
+
 /// Variables after the type `ty`: `[2] a = …, b[3];`
 fn variables(qualifiers: &Qualifiers, ty: &Token, rest: &[Token]) -> Option<Vec<Variable>> {
     let of_type = array_len(rest);

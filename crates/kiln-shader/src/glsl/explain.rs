@@ -39,15 +39,19 @@ fn help(
         suggest::closest(named, words().chain(builtin::VARIABLES))
     } else if message.starts_with("unknown function") {
         suggest::closest(named, words().chain(builtin::FUNCTIONS))
+    } else if message.starts_with("no type") {
+        suggest::closest(named, words().chain(builtin::TYPES))
     } else if message.starts_with("no ") {
         suggest::closest(named, words())
-    } else if message.starts_with("expected `;`") {
+    } else if message.starts_with("expected") && message.contains("`;`") {
         let text = &sources.files[file].text;
         let before = text[..start].trim_end();
         let line = Span::new(text, before.len()..before.len()).line;
         return Some(format!("a `;` may be missing at the end of line {line}"));
     } else if message.contains("x2` cannot stand in a struct") {
         return Some("use `vec4`, or a matrix of 3 or 4 rows".to_owned());
+    } else if message.starts_with("textures of integers") {
+        return Some("read them with `texelFetch`".to_owned());
     } else {
         None
     };

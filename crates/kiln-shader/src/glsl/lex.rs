@@ -79,8 +79,8 @@ pub fn tokenize(file: usize, text: &str) -> Result<Vec<Token>, OpenComment> {
             (at, spaced) = (at + len, true);
         } else if rest.starts_with("//") {
             (at, spaced) = (at + line_comment_len(rest), true);
-        } else if rest.starts_with("/*") {
-            let end = rest[2..].find("*/").ok_or(OpenComment(at))?;
+        } else if let Some(comment) = rest.strip_prefix("/*") {
+            let end = comment.find("*/").ok_or(OpenComment(at))?;
             (at, spaced) = (at + end + 4, true);
         } else if first.is_whitespace() || first == '\u{feff}' {
             starts_line |= first == '\n' || first == '\r';
@@ -144,8 +144,9 @@ fn number_len(rest: &str) -> usize {
     at
 }
 
-/// Index of the bracket that closes the one at `open`, if brackets pair up.
+/// Index of the bracket that closes the one at `open`, if there is one and brackets pair up.
 pub fn closing(tokens: &[Token], open: usize) -> Option<usize> {
+    tokens.get(open).filter(|token| ["(", "[", "{"].iter().any(|mark| token.is(mark)))?;
     let mut depth = 0_usize;
     for (index, token) in tokens.iter().enumerate().skip(open) {
         match &*token.text {

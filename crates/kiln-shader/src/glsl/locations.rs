@@ -147,7 +147,8 @@ fn number(side: &mut [Passed]) -> Vec<(usize, String)> {
                 passed.location = Some(start);
             }
             None => {
-                faults.push((at, format!("the location of `{}` is taken, or too high", passed.name.text)))
+                let message = format!("the location of `{}` is taken, or too high", passed.name.text);
+                faults.push((at, message));
             }
         }
     }

@@ -8,8 +8,8 @@ use super::Parsed;
 use super::bindings::{self, Bindings};
 use super::builtin;
 use super::check;
-use super::declare::{Block, Function, Item, Variable};
-use super::lex::{self, Kind, Token};
+use super::declare::{self, Block, Function, Item, Variable};
+use super::lex::{Kind, Token};
 use super::locations::{self, Interface, Passed};
 use super::rewrite::{Meaning, Member, Rewriter, Scene, Stored};
 use super::source::{Mapped, Place, Sources};
@@ -20,8 +20,7 @@ use crate::names::{GROUPS, Group};
 /// What naga is given first. Of its versions this one takes most.
 const VERSION: &str = "#version 460 core\n";
 
-/// The author's `main`: another one calls it, because there is work before and after, and it may return
-/// early.
+/// The author's `main` where another one calls it: if there is work before or after, as it may return early.
 pub const AUTHORS_MAIN: &str = "kiln_main";
 
 /// Writes `stage`; what cannot be written is left in `sources`.
@@ -185,7 +184,8 @@ fn stored_type(variable: &Variable) -> (String, Option<Stored>) {
     (name, Some(stored))
 }
 
-fn put(out: &mut Mapped, tokens: &[Token]) {
+/// Appends tokens with space between.
+pub fn put(out: &mut Mapped, tokens: &[Token]) {
     for token in tokens {
         out.push(&token.text, token.place);
         out.push(if matches!(&*token.text, ";" | "{" | "}") { "\n" } else { " " }, token.place);
@@ -206,7 +206,7 @@ impl Writer<'_, '_, '_> {
                 self.types.push("{\n", structure.name.place);
                 for member in &structure.members {
                     check::struct_member(self.sources, member);
-                    let (ty, array) = (member.ty.clone(), member.array.clone());
+                    let (ty, array) = (member.ty.clone(), declare::reversed(&member.array));
                     put(&mut self.types, &[vec![ty, member.name.clone()], array].concat());
                     self.types.push(";\n", member.name.place);
                 }
@@ -224,9 +224,14 @@ impl Writer<'_, '_, '_> {
                 for name in invariant {
                     self.globals.push("invariant gl_Position;\n", name.place);
                 }
-                let kept = qualifiers.layout.iter().filter(|layout| {
-                    layout.name.text.starts_with("local_size_") || layout.name.is("early_fragment_tests")
-                });
+                if let Some(early) = qualifiers.layout("early_fragment_tests") {
+                    let place = early.name.place;
+                    let warning = self.sources.warning(place, "`early_fragment_tests` has no effect");
+                    let help = "devices test early by themselves where it changes nothing";
+                    self.sources.diagnostics.push(warning.with_help(help));
+                }
+                let kept =
+                    qualifiers.layout.iter().filter(|layout| layout.name.text.starts_with("local_size_"));
                 for layout in kept {
                     let value: String = layout.value.iter().map(|token| &*token.text).collect();
                     let value = if value.is_empty() { value } else { format!(" = {value}") };
@@ -234,7 +239,10 @@ impl Writer<'_, '_, '_> {
                 }
             }
             Item::Function(_) => {}
-            Item::Other(tokens) => put(&mut self.globals, tokens),
+            Item::Other(tokens) => {
+                check::words(self.sources, tokens);
+                put(&mut self.globals, tokens);
+            }
         }
     }
 
@@ -281,7 +289,9 @@ impl Writer<'_, '_, '_> {
 
     /// `[…]` of a variable, with the length that its initial value has.
     fn with_length(&mut self, variable: &Variable) -> Vec<Token> {
-        let Some(initial) = &variable.initial else { return variable.array.clone() };
+        let Some(initial) = &variable.initial else {
+            return declare::reversed(&variable.array);
+        };
         let equals = Token::new(Kind::Mark, "=", variable.place());
         let tokens: Vec<Token> = variable.array.iter().chain([&equals]).chain(initial).cloned().collect();
         let count = self.sources.diagnostics.len();
@@ -289,7 +299,7 @@ impl Writer<'_, '_, '_> {
         // The initial value is rewritten once more where it is kept, and reports its faults there.
         self.sources.diagnostics.truncate(count);
         let len = written.iter().position(|token| token.is("=")).unwrap_or(0);
-        written[..len].to_vec()
+        declare::reversed(&written[..len])
     }
 
     fn constant(&mut self, variable: &Variable) {
@@ -413,7 +423,7 @@ impl Writer<'_, '_, '_> {
     fn member(&mut self, member: &Variable, is_uniform: bool) {
         let ty = if is_uniform { stored_type(member).0 } else { member.ty.text.to_string() };
         let ty = Token::new(Kind::Word, ty, member.ty.place);
-        put(&mut self.globals, &[vec![ty, member.name.clone()], member.array.clone()].concat());
+        put(&mut self.globals, &[vec![ty, member.name.clone()], declare::reversed(&member.array)].concat());
         self.globals.push(";\n", member.name.place);
     }
 
@@ -490,13 +500,14 @@ impl Writer<'_, '_, '_> {
         result.iter().for_each(|token| check::type_name(self.sources, token));
         let returned = result.last().map(|token| Rc::clone(&token.text));
         let mut rewriter = Rewriter::new(self.sources, &mut self.scene, returned);
+        rewriter.function = Some(Rc::clone(&function.name.text));
         let parameters: Vec<Vec<Token>> =
             function.parameters.iter().map(|parameter| rewriter.parameter(parameter)).collect();
         let body = function.body.as_ref().map(|body| switch::without_fall_through(rewriter.sources, body));
         let body = body.map(|body| rewriter.tokens(&body));
         put(&mut self.functions, &result);
-        let name = if function.name.is("main") { AUTHORS_MAIN } else { &*function.name.text };
-        self.functions.push(name, place);
+        let is_wrapped = function.name.is("main") && self.wraps_main();
+        self.functions.push(if is_wrapped { AUTHORS_MAIN } else { &function.name.text }, place);
         self.functions.push("(", place);
         for (index, parameter) in parameters.iter().enumerate() {
             if index > 0 {
@@ -512,21 +523,29 @@ impl Writer<'_, '_, '_> {
         }
     }
 
+    /// Whether there is work before or after the author's `main`.
+    fn wraps_main(&self) -> bool {
+        !(self.prologue.text.is_empty() && self.epilogue.text.is_empty())
+    }
+
     fn finish(self) -> Mapped {
         let start = Place { file: self.stage.root, start: 0, end: 0 };
         let mut text = Mapped::default();
         text.push(VERSION, start);
+        let wraps_main = self.wraps_main();
         text.append(self.types);
         text.append(self.globals);
         for (name, place) in self.scene.polyfills {
             text.push(&builtin::polyfill(name).unwrap_or_default(), place);
         }
         text.append(self.functions);
-        text.push("void main() {\n", start);
-        text.append(self.prologue);
-        text.push(&format!("{AUTHORS_MAIN}();\n"), start);
-        text.append(self.epilogue);
-        text.push("}\n", start);
+        if wraps_main {
+            text.push("void main() {\n", start);
+            text.append(self.prologue);
+            text.push(&format!("{AUTHORS_MAIN}();\n"), start);
+            text.append(self.epilogue);
+            text.push("}\n", start);
+        }
         text
     }
 }
@@ -546,38 +565,4 @@ pub fn holder_names(stages: &[Parsed]) -> BTreeMap<Group, String> {
         name
     };
     names.into_iter().map(|(group, name)| (group, unused(format!("{name}Uniforms")))).collect()
-}
-
-/// Whether brackets pair up and nothing is nested too deep for naga.
-pub fn check_nesting(sources: &mut Sources<'_, '_>, tokens: &[Token]) -> bool {
-    let mut text = Mapped::default();
-    put(&mut text, tokens);
-    let plain = crate::token::tokenize(&text.text).unwrap_or_default();
-    let Err(fault) = crate::limits::check_nesting(&text.text, &plain) else { return true };
-    let Some(place) = text.origin(fault.range) else { return false };
-    let mut diagnostic = sources.error(place, &fault.message);
-    if let Some(opened) = fault.opened.and_then(|opened| text.origin(opened)) {
-        diagnostic.notes.insert(0, format!("opened at {}", sources.describe(opened)));
-    } else if fault.message.starts_with("expression") {
-        diagnostic.help =
-            Some("split it with a variable, or end an `else if` chain with `switch`".to_owned());
-    }
-    sources.diagnostics.push(diagnostic);
-    false
-}
-
-/// Whether all tokens are GLSL's.
-pub fn check_characters(sources: &mut Sources<'_, '_>, tokens: &[Token]) -> bool {
-    let known = |token: &&Token| token.kind != Kind::Mark || is_mark(&token.text);
-    let Some(wrong) = tokens.iter().find(|token| !known(token)) else { return true };
-    let fault = sources.error(wrong.place, format!("`{}` is no character of GLSL here", wrong.text));
-    sources.diagnostics.push(fault);
-    false
-}
-
-fn is_mark(text: &str) -> bool {
-    text.is_ascii()
-        && !["##", "::", "->", "#", "@", "$", "`", "\"", "'", "\\"].contains(&text)
-        && !text.bytes().any(|byte| byte.is_ascii_control())
-        && lex::tokenize(0, text).is_ok()
 }

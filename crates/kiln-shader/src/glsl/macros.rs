@@ -97,6 +97,11 @@ impl Macros {
         (!is_hidden(token)).then(|| definition.clone())
     }
 
+    /// Whether the limit is passed: what follows would only repeat it.
+    pub fn is_exhausted(&self) -> bool {
+        self.expanded > EXPANDED_TOKENS_MAX
+    }
+
     fn line(&self, place: Place) -> usize {
         let starts = self.line_starts.get(&place.file);
         starts.map_or(0, |starts| starts.partition_point(|start| *start <= place.start))

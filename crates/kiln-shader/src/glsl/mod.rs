@@ -37,11 +37,13 @@ mod lex;
 mod locations;
 mod lower;
 mod macros;
+mod nesting;
 mod preprocess;
 mod rewrite;
 mod source;
 mod stage;
 mod stage_module;
+mod statement;
 mod switch;
 
 /// A stage after preprocessing.
@@ -82,7 +84,14 @@ pub fn compile(program: &Program, features: &BTreeSet<String>, read: &mut Read<'
         let annotations = annotations(&mut sources);
         compiled.reflection.parameters = parameter::parameters(&compiled.reflection, annotations);
     }
-    let Sources { dependencies, diagnostics, .. } = sources;
+    let Sources { dependencies, diagnostics: found, .. } = sources;
+    // What several stages include is wrong once.
+    let mut diagnostics: Vec<Diagnostic> = Vec::new();
+    for diagnostic in found {
+        if !diagnostics.contains(&diagnostic) {
+            diagnostics.push(diagnostic);
+        }
+    }
     Outcome { compiled, diagnostics, dependencies, features: named, ..Outcome::default() }
 }
 
@@ -147,7 +156,7 @@ fn load(
             continue;
         }
         let tokens = preprocessed.tokens;
-        if lower::check_characters(sources, &tokens) && lower::check_nesting(sources, &tokens) {
+        if nesting::check_characters(sources, &tokens) && nesting::check_nesting(sources, &tokens) {
             stages.push(Parsed::new(stage, root, tokens));
         }
     }
@@ -232,13 +241,18 @@ fn link(
         Ok(joined) => joined,
         Err(join::Clash(name)) => {
             let message = format!("`{name}` differs between the stages");
-            let diagnostic = match bound.places.get(&name) {
-                Some(place) => sources.error(*place, message),
-                None => Diagnostic::error(message).in_file(&sources.files[root].path),
+            let places = bindings::places_of(stages, &name);
+            let diagnostic = match &places[..] {
+                [first, .., last] => {
+                    let mut diagnostic = sources.error(*last, message);
+                    let note = format!("the other is declared at {}", sources.describe(*first));
+                    diagnostic.notes.insert(0, note);
+                    diagnostic
+                }
+                _ => Diagnostic::error(message).in_file(&sources.files[root].path),
             };
-            sources
-                .diagnostics
-                .push(diagnostic.with_help("declare it alike in all stages, best in one included file"));
+            let help = "declare it alike in all stages, best in one included file";
+            sources.diagnostics.push(diagnostic.with_help(help));
             return None;
         }
     };

@@ -195,7 +195,7 @@ impl Preprocessor<'_, '_, '_> {
             }
             Err(fault) => {
                 self.error(fault.place, fault.message);
-                self.stopped = true;
+                self.stopped |= self.macros.is_exhausted();
                 Vec::new()
             }
         }

@@ -10,6 +10,7 @@ use super::builtin::{self, Combined};
 use super::declare::{self, DROPPED};
 use super::lex::{self, Kind, Token};
 use super::source::{Place, Sources};
+use super::statement;
 use crate::Stage;
 
 /// How the use of a global name is written for naga.
@@ -84,6 +85,8 @@ pub struct Rewriter<'a, 's, 'r> {
     /// Text in place of a token.
     instead: BTreeMap<usize, Vec<Token>>,
     result: Option<Rc<str>>,
+    /// The function that is rewritten.
+    pub function: Option<Rc<str>>,
     out: Vec<Token>,
 }
 
@@ -112,6 +115,7 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
             before: BTreeMap::new(),
             instead: BTreeMap::new(),
             result,
+            function: None,
             out: Vec::new(),
         }
     }
@@ -145,7 +149,12 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
             };
             self.declare(&name.text, local);
         }
-        let Some(combined) = combined else { return kept };
+        let Some(combined) = combined else {
+            let of_type = declare::array_len(rest);
+            let end = rest.len().min(of_type + 1);
+            let arrays = (declare::reversed(&rest[..of_type]), declare::reversed(&rest[end..]));
+            return [&kept[..=at], &arrays.0, &rest[of_type..end], &arrays.1].concat();
+        };
         let ty = &kept[at];
         if rest.iter().any(|token| token.is("[")) {
             self.report(
@@ -246,8 +255,18 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
         }
         if self.is_declaration(tokens, at) {
             self.declaration(tokens, at);
+        } else if self.is_type(text) {
+            // A constructor of an array.
+            self.reverse(tokens, at + 1);
         } else if self.local(text).is_none() && self.scene.functions.contains(text) && is_call {
             // The author's function hides what GLSL has of the same name.
+            if self.function.as_deref() == Some(text) {
+                self.report(
+                    token.place,
+                    format!("`{text}` calls itself"),
+                    "shaders have no recursion: use a loop",
+                );
+            }
         } else if self.rewritten(tokens, at, is_call) {
             return;
         }
@@ -383,12 +402,16 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
             (at + 1..=close).for_each(|inner| drop(self.instead.insert(inner, Vec::new())));
             return true;
         }
+        if self.scene.stage != Stage::Fragment && builtin::is_derivative(&token.text) {
+            let message = format!("`{}` stands outside of a fragment stage", token.text);
+            self.report(token.place, message, "derivatives are taken in the fragment stage");
+        }
         let modern = builtin::modern(&token.text);
-        if modern.is_none() {
-            if let Some(help) = builtin::replacement(&token.text) {
-                self.report(token.place, format!("`{}` is not supported", token.text), help);
-                return false;
-            }
+        if modern.is_none()
+            && let Some(help) = builtin::replacement(&token.text)
+        {
+            self.report(token.place, format!("`{}` is not supported", token.text), help);
+            return false;
         }
         // The function is given its depth comparison as one number, older ones gave a colour.
         if token.text.starts_with("shadow") && modern.is_some() {
@@ -430,9 +453,11 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
     fn declaration(&mut self, tokens: &[Token], at: usize) {
         let type_array = declare::array_len(&tokens[at + 1..]);
         let is_const = at.checked_sub(1).is_some_and(|before| tokens[before].is("const"));
+        self.reverse(tokens, at + 1);
         let mut name = at + 1 + type_array;
         loop {
-            let end = declarator_end(tokens, name);
+            self.reverse(tokens, name + 1);
+            let end = statement::declarator_end(tokens, name);
             self.instead.insert(name, vec![tokens[name].clone()]);
             self.pending.entry(end).or_default().push(Rc::clone(&tokens[name].text));
             if !tokens.get(end).is_some_and(|token| token.is(","))
@@ -451,12 +476,24 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
         }
     }
 
+    /// Turns `[…][…]` at token `at` round for naga.
+    fn reverse(&mut self, tokens: &[Token], at: usize) {
+        let array = &tokens[at..at + declare::array_len(&tokens[at..])];
+        let reversed = declare::reversed(array);
+        let is_simple = array.windows(2).all(|pair| !(pair[0].is("[") && pair[1].is("]")));
+        if is_simple && array.windows(2).any(|pair| pair[0].is("]") && pair[1].is("[")) {
+            for index in at..at + array.len() {
+                self.instead.insert(index, vec![reversed[index - at].clone()]);
+            }
+        }
+    }
+
     /// The scope of a `for` begins at its parenthesis and ends with its body.
     fn open_loop(&mut self, tokens: &[Token], at: usize) {
         let Some(close) = lex::closing(tokens, at + 1) else { return };
         let end = match tokens.get(close + 1) {
             Some(open) if open.is("{") => lex::closing(tokens, close + 1).map_or(tokens.len(), |end| end + 1),
-            _ => declarator_end_of_statement(tokens, close + 1),
+            _ => statement::end(tokens, close + 1),
         };
         self.scopes.push(BTreeMap::new());
         self.loops.push(end);
@@ -464,25 +501,12 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
 
     /// naga jumps over the condition of `do … while` at a `continue`, for ever.
     fn check_do(&mut self, tokens: &[Token], at: usize) {
-        if !tokens.get(at + 1).is_some_and(|open| open.is("{")) {
-            return;
-        }
-        let Some(close) = lex::closing(tokens, at + 1) else { return };
-        let mut inner = at + 2;
-        while inner < close {
-            let token = &tokens[inner];
-            if token.is("continue") {
-                self.report(
-                    token.place,
-                    "`continue` in a `do` loop is not supported",
-                    "write `while (true) { … if (!condition) break; }`, or put the rest under an `if`",
-                );
-            }
-            inner = if ["for", "while", "do"].iter().any(|word| token.is(word)) {
-                body_end(tokens, inner).unwrap_or(inner + 1).max(inner + 1)
-            } else {
-                inner + 1
-            };
+        for place in statement::continues_of_do(tokens, at) {
+            self.report(
+                place,
+                "`continue` in a `do` loop is not supported",
+                "write `while (true) { … if (!condition) break; }`, or put the rest under an `if`",
+            );
         }
     }
 
@@ -539,37 +563,3 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
 
 /// Functions that are defined here when they are used.
 pub const POLYFILLED: [&str; 5] = ["isnan", "isinf", "modf", "outerProduct", "matrixCompMult"];
-
-/// The `,`, `;` or closing bracket after the declarator at `name`.
-fn declarator_end(tokens: &[Token], name: usize) -> usize {
-    let mut depth = 0_usize;
-    for (index, token) in tokens.iter().enumerate().skip(name) {
-        match &*token.text {
-            "(" | "[" | "{" => depth += 1,
-            ")" | "]" | "}" if depth == 0 => return index,
-            ")" | "]" | "}" => depth -= 1,
-            "," | ";" if depth == 0 => return index,
-            _ => {}
-        }
-    }
-    tokens.len()
-}
-
-/// Index after the next `;` outside of brackets.
-fn declarator_end_of_statement(tokens: &[Token], mut at: usize) -> usize {
-    while at < tokens.len() {
-        at = declarator_end(tokens, at);
-        if tokens.get(at).is_none_or(|token| !token.is(",")) {
-            return at + 1;
-        }
-        at += 1;
-    }
-    at
-}
-
-/// Index after the braces of the loop at `at`, if its body has braces.
-fn body_end(tokens: &[Token], at: usize) -> Option<usize> {
-    let open = if tokens[at].is("do") { at + 1 } else { lex::closing(tokens, at + 1)? + 1 };
-    tokens.get(open).filter(|token| token.is("{"))?;
-    Some(lex::closing(tokens, open)? + 1)
-}

@@ -30,7 +30,11 @@ fn run(text: &str, stage: Stage, names: &BTreeMap<(u32, u32), String>) -> Result
     if let Err(error) = front::validate(&module) {
         let mut finding = front::validation_finding(&module, &error);
         finding.message = in_glsl(&finding.message);
+        // The chain of entry points and functions: the place says it.
+        finding.notes.retain(|note| !(note.starts_with("function '") || note.starts_with("entry point")));
         finding.notes.iter_mut().for_each(|note| *note = in_glsl(note));
+        // A function's label is but its head, and stands for all of it.
+        finding.labels.sort_by_key(|(_, label)| label.starts_with("naga::ir::Function"));
         return Ok(Err(vec![finding]));
     }
     canonical::strip_unused(&mut module);
@@ -58,13 +62,15 @@ fn name_variables(module: &mut Module, stage: Stage, names: &BTreeMap<(u32, u32)
         }
     }
     for (_, function) in module.functions.iter_mut() {
-        if function.name.as_deref() == Some(lower::AUTHORS_MAIN) {
-            let name = match stage {
-                Stage::Vertex => "vertex_main",
-                Stage::Fragment => "fragment_main",
-                Stage::Compute => "compute_main",
-            };
-            function.name = Some(name.to_owned());
+        let stage = match stage {
+            Stage::Vertex => "vertex",
+            Stage::Fragment => "fragment",
+            Stage::Compute => "compute",
+        };
+        match function.name.as_deref() {
+            Some("main") => function.name = Some(format!("{stage}_main")),
+            Some(lower::AUTHORS_MAIN) => function.name = Some(format!("{stage}_body")),
+            _ => {}
         }
     }
 }
@@ -128,6 +134,12 @@ fn ends(block: &Block) -> bool {
 
 /// naga's types in GLSL's words.
 fn in_glsl(message: &str) -> String {
+    if let Some(operation) = message.strip_prefix("operation ").and_then(|rest| rest.split(' ').next()) {
+        return format!("these types do not go together in `{}`", operator(operation));
+    }
+    if message.starts_with("unable to operate on image class") {
+        return "textures of integers cannot be filtered".to_owned();
+    }
     let mut text = message.to_owned();
     for (scalar, prefix) in [("f32", ""), ("i32", "i"), ("u32", "u"), ("bool", "b")] {
         for len in 2..=4 {
@@ -140,11 +152,41 @@ fn in_glsl(message: &str) -> String {
     text.replace("`f32`", "`float`").replace("`i32`", "`int`").replace("`u32`", "`uint`")
 }
 
+/// The sign of naga's operator.
+fn operator(name: &str) -> &str {
+    match name {
+        "Add" => "+",
+        "Subtract" => "-",
+        "Multiply" => "*",
+        "Divide" => "/",
+        "Modulo" => "%",
+        "Equal" => "==",
+        "NotEqual" => "!=",
+        "Less" => "<",
+        "LessEqual" => "<=",
+        "Greater" => ">",
+        "GreaterEqual" => ">=",
+        "And" => "&",
+        "ExclusiveOr" => "^",
+        "InclusiveOr" => "|",
+        "LogicalAnd" => "&&",
+        "LogicalOr" => "||",
+        "ShiftLeft" => "<<",
+        "ShiftRight" => ">>",
+        other => other,
+    }
+}
+
 fn finding(text: &str, error: &Error) -> Finding {
     let range = error.meta.to_range();
     let found = range.clone().and_then(|range| text.get(range)).unwrap_or("the end").to_owned();
     let message = match &error.kind {
         ErrorKind::EndOfFile => "unexpected end of the file".to_owned(),
+        ErrorKind::InvalidToken(TokenValue::Identifier(name), expected)
+            if expected.contains(&ExpectedToken::Eof) =>
+        {
+            format!("no type `{name}`")
+        }
         ErrorKind::InvalidToken(_, expected) => {
             let expected: Vec<String> = expected.iter().map(expected_text).collect();
             format!("expected {}, found `{found}`", expected.join(" or "))
@@ -158,7 +200,7 @@ fn finding(text: &str, error: &Error) -> Finding {
             format!("`mat{columns}x2` cannot stand in a struct or uniform")
         }
         ErrorKind::NotImplemented(what) => format!("{what} is not supported"),
-        other => describe::clean(&other.to_string()).replace('\'', "`").replace('"', "`"),
+        other => describe::clean(&other.to_string()).replace(['\'', '"'], "`"),
     };
     let labels = range.map(|range| (range, String::new())).into_iter().collect();
     Finding { message: in_glsl(&message), notes: Vec::new(), labels }

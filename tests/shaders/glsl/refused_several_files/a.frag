@@ -1,0 +1,3 @@
+#version 330
+#include "x.inc.glsl"
+void main() { }

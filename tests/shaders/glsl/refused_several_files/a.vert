@@ -1,0 +1,3 @@
+#version 330
+#error in the vertex stage
+void main() { }

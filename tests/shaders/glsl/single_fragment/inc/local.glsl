@@ -1,0 +1,1 @@
+float local() { return 1.0; }
