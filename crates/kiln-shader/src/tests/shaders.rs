@@ -36,26 +36,18 @@ const OWNED: [(&str, &str); 13] = [
     ("transmission", "transmission_"),
 ];
 
+/// Every file of the repository's `shaders/lib`, `shaders/pbr` and `shaders/bake`.
 fn shipped() -> Files {
-    macro_rules! files {
-        ($($path:literal),*) => {
-            Files::new(&[$(($path, include_str!(concat!("../../../../", $path)))),*])
-        };
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut files = Files::new(&[]);
+    for folder in ["shaders/lib", "shaders/pbr", "shaders/bake"] {
+        for entry in std::fs::read_dir(root.join(folder)).unwrap() {
+            let path = entry.unwrap().path();
+            let name = format!("{folder}/{}", path.file_name().unwrap().to_str().unwrap());
+            files.0.insert(name, std::fs::read_to_string(path).unwrap().into());
+        }
     }
-    files![
-        "shaders/lib/brdf.wgsl",
-        "shaders/lib/colour.wgsl",
-        "shaders/lib/environment.wgsl",
-        "shaders/lib/frame.wgsl",
-        "shaders/lib/fullscreen.wgsl",
-        "shaders/lib/material.wgsl",
-        "shaders/lib/sheen.wgsl",
-        "shaders/lib/vector.wgsl",
-        "shaders/pbr/background.wgsl",
-        "shaders/pbr/lobes.wgsl",
-        "shaders/pbr/pbr.wgsl",
-        "shaders/pbr/tonemap.wgsl"
-    ]
+    files
 }
 
 #[track_caller]
@@ -160,20 +152,36 @@ fn textures_of_all_features_fit_the_default_limit() {
     assert!(samplers.count() <= 16);
 }
 
+/// The first function that a module declares.
+fn first_function(text: &str) -> Option<&str> {
+    let line = text.lines().find_map(|line| line.strip_prefix("fn "))?;
+    line.split('(').next()
+}
+
 #[test]
 fn every_library_function_is_valid() {
-    // Unused functions are validated too, so importing one name of each module checks all of it.
-    let root = "import lib::brdf::{d_charlie, d_ggx, f_schlick, f_schlick_roughness, v_ashikhmin, v_smith_height_correlated};
-        import lib::colour::{from_srgb, luminance, tone_map_aces_fitted};
-        @fragment fn fs_main(@location(0) x: f32) -> @location(0) vec4f {
-            let d = d_ggx(x, x, x) * v_smith_height_correlated(x, x, x) + d_charlie(x, x) * v_ashikhmin(x, x);
-            let f = f_schlick(vec3f(x), 1.0, x) + f_schlick_roughness(vec3f(x), x, x);
-            return vec4f(from_srgb(f) + tone_map_aces_fitted(f), luminance(f) * d);
-        }";
-    let mut files = shipped();
-    files.0.insert("shaders/test/root.wgsl".to_owned(), root.into());
-    let wgsl = compiled(files.compile("shaders/test/root.wgsl", &[])).wgsl;
-    assert!(wgsl.contains("fn d_charlie("));
+    let files = shipped();
+    // A module is joined whole and validated before what is unused goes: one name of each checks all of it.
+    for (path, text) in files.0.iter().filter(|(path, _)| path.starts_with("shaders/lib/")) {
+        let Some(name) = first_function(text) else {
+            assert!(
+                path.ends_with("constants.wgsl") || path.ends_with("frame.wgsl"),
+                "{path} has no function"
+            );
+            continue;
+        };
+        let module = path.trim_start_matches("shaders/lib/").trim_end_matches(".wgsl");
+        let compile = |text: &str| {
+            let root =
+                format!("import lib::{module}::{name};\n@compute @workgroup_size(1) fn main() {{ _ = 1; }}");
+            let mut files = shipped();
+            files.0.insert(path.clone(), text.into());
+            files.0.insert("shaders/test/root.wgsl".to_owned(), root.as_str().into());
+            files.compile("shaders/test/root.wgsl", &[])
+        };
+        compiled(compile(text));
+        assert!(compile(&format!("{text}\nfn wrong() -> f32 {{ return 1u; }}")).compiled.is_none(), "{path}");
+    }
 }
 
 #[test]
