@@ -30,8 +30,8 @@ fn v_smith_anisotropic(tbn_l: vec3f, tbn_v: vec3f, alpha_tb: vec2f) -> f32 {
 // A normal bent against the brush, so that its mirror direction lies within the stretched lobe: what an isotropic chain is
 // read with. McAuley 2015, "Rendering the World of Far Cry 4"; the weight as in the Khronos sample viewer.
 fn anisotropic_normal(normal: vec3f, bitangent: vec3f, view: vec3f, strength: f32, perceptual_roughness: f32) -> vec3f {
-    // Along the brush the view has no side to bend to.
-    let bent = normalize_or(cross(normalize_or(cross(bitangent, view), normal), bitangent), normal);
+    // The view without its part along the bitangent; along the bitangent itself there is no side to bend to.
+    let bent = normalize_or(cross(cross(bitangent, view), bitangent), normal);
     let sharp = 1.0 - strength * (1.0 - perceptual_roughness);
     let sharp2 = sharp * sharp;
     return normalize_or(mix(bent, normal, sharp2 * sharp2), normal);

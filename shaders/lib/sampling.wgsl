@@ -65,9 +65,10 @@ fn pdf_ggx(n_dot_h: f32, n_cross_h_squared: f32, alpha: f32) -> f32 {
 fn sample_ggx_visible(view: vec3f, u: vec2f, alpha: f32) -> vec3f {
     let a = max(alpha, ALPHA_MIN);
     let stretched = normalize_or(vec3f(a * view.xy, view.z), vec3f(0.0, 0.0, 1.0));
-    let z = (1.0 - u.y) * (1.0 + stretched.z) - stretched.z;
-    let sine = sqrt(saturate((1.0 - z) * (1.0 + z)));
-    let h = spherical_direction(sine, z, u.x) + stretched;
+    // How far below the pole of the cap: kept as it is, because 1 - z of a rounded z has no digits near the pole.
+    let depth = u.y * (1.0 + stretched.z);
+    let sine = sqrt(max(depth * (2.0 - depth), 0.0));
+    let h = spherical_direction(sine, 1.0 - depth, u.x) + stretched;
     return normalize_or(vec3f(a * h.xy, max(h.z, 0.0)), vec3f(0.0, 0.0, 1.0));
 }
 

@@ -1,0 +1,14 @@
+//! The shader library and the bake passes on the device, beside functions in `f64`, native twins and exact maps.
+//!
+//! `cargo test --release -p kiln-gpu --test library -- --nocapture` prints every error with its tolerance.
+
+mod bakes;
+mod colour;
+mod cubes;
+mod functions;
+mod lobes;
+mod passes;
+mod reference;
+mod samples;
+mod support;
+mod twins;

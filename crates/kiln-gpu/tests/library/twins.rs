@@ -1,0 +1,167 @@
+//! The algorithms of the bake passes and of the tutorials, natively in `f64`: same points, same steps, same order.
+
+use std::f64::consts::PI;
+
+use kiln_brdf::{Masking, d_ggx, sampling};
+use kiln_image::{Cube, Panorama};
+use kiln_sphere::direction::cube_texel_centre;
+use kiln_sphere::{cube_direction, panorama_uv};
+
+use crate::cubes::{Levels, Rgb, panorama_bilinear};
+
+/// Tangent and bitangent of a normal.
+pub type Basis = fn([f64; 3]) -> [[f64; 3]; 2];
+
+/// That of the tutorials: right = normalize(cross(+Y, N)), up = cross(N, right). Undefined at N = ±Y.
+pub fn tutorial_basis([x, y, z]: [f64; 3]) -> [[f64; 3]; 2] {
+    let length = x.hypot(z);
+    let (right, normal) = ([z / length, 0.0, -x / length], [x, y, z]);
+    let cross = [
+        normal[1] * right[2] - normal[2] * right[1],
+        normal[2] * right[0] - normal[0] * right[2],
+        normal[0] * right[1] - normal[1] * right[0],
+    ];
+    [right, cross]
+}
+
+/// A local direction in the world.
+fn in_world(basis: Basis, normal: [f64; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
+    let [tangent, bitangent] = basis(normal);
+    std::array::from_fn(|i| x * tangent[i] + y * bitangent[i] + z * normal[i])
+}
+
+fn add(sum: &mut Rgb, weight: f64, value: Rgb) {
+    for (sum, value) in sum.iter_mut().zip(value) {
+        *sum += weight * value;
+    }
+}
+
+/// (1 + s² + t²)^(−3/2).
+fn jacobian(s: f64, t: f64) -> f64 {
+    (1.0 + s * s + t * t).powf(-1.5)
+}
+
+pub fn equirect_to_cube(panorama: &Panorama, face_size: usize, samples_per_edge: usize) -> Cube {
+    let edge = 2.0 / face_size as f64;
+    let texel = |index: usize| {
+        let (face, y, x) =
+            (index / (face_size * face_size), index / face_size % face_size, index % face_size);
+        let (mut sum, mut total) = ([0.0; 3], 0.0);
+        for i in 0..samples_per_edge * samples_per_edge {
+            let within = |i: usize| ((i as f64 + 0.5) / samples_per_edge as f64 - 0.5) * edge;
+            let s = cube_texel_centre(face_size, x) + within(i % samples_per_edge);
+            let t = cube_texel_centre(face_size, y) + within(i / samples_per_edge);
+            let weight = jacobian(s, t);
+            add(&mut sum, weight, panorama_bilinear(panorama, panorama_uv(cube_direction(face, s, t))));
+            total += weight;
+        }
+        sum.map(|value| (value / total) as f32)
+    };
+    Cube { face_size, rgb: (0..6 * face_size * face_size).flat_map(texel).collect() }
+}
+
+/// The next level; `weighted` by solid angles, or plainly, as texture hardware makes it.
+pub fn half_size(cube: &Cube, weighted: bool) -> Cube {
+    let (above, size) = (cube.face_size, cube.face_size / 2);
+    let texel = |index: usize| {
+        let (face, y, x) = (index / (size * size), index / size % size, index % size);
+        let (mut sum, mut total) = ([0.0; 3], 0.0);
+        for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+            let (x, y) = (2 * x + dx, 2 * y + dy);
+            let weight = jacobian(cube_texel_centre(above, x), cube_texel_centre(above, y));
+            let weight = if weighted { weight } else { 1.0 };
+            let at = ((face * above + y) * above + x) * 3;
+            add(&mut sum, weight, [0, 1, 2].map(|i| f64::from(cube.rgb[at + i])));
+            total += weight;
+        }
+        sum.map(|value| (value / total) as f32)
+    };
+    Cube { face_size: size, rgb: (0..6 * size * size).flat_map(texel).collect() }
+}
+
+/// All levels of a cube.
+pub fn with_mips(cube: Cube, weighted: bool) -> Levels {
+    let mut levels = vec![cube];
+    while levels[levels.len() - 1].face_size > 1 {
+        levels.push(half_size(&levels[levels.len() - 1], weighted));
+    }
+    Levels(levels)
+}
+
+pub fn irradiance_grid(source: &Levels, basis: Basis, normal: [f64; 3], step: f64) -> Rgb {
+    let (columns, rows) = ((2.0 * PI / step).ceil() as u32, (0.5 * PI / step).ceil() as u32);
+    let mut sum = [0.0; 3];
+    for column in 0..columns {
+        let (sin_phi, cos_phi) = (f64::from(column) * step).sin_cos();
+        for row in 0..rows {
+            let (sine, cosine) = (f64::from(row) * step).sin_cos();
+            let light = in_world(basis, normal, [sine * cos_phi, sine * sin_phi, cosine]);
+            add(&mut sum, sine * cosine, source.sample(light, 0.0));
+        }
+    }
+    sum.map(|value| value * PI / f64::from(columns * rows))
+}
+
+/// Level of the source at which a texel is as large as what a sample stands for.
+fn filter_level(source: &Levels, pdf: f64, count: u32, bias: f64) -> f64 {
+    let texel_sr = 4.0 * PI / (6.0 * (source.face_size() as f64).powi(2));
+    let sample_sr = 1.0 / (f64::from(count) * pdf).max(1e-12);
+    (0.5 * (sample_sr / texel_sr).log2() + bias).max(0.0)
+}
+
+pub fn irradiance_cosine(source: &Levels, normal: [f64; 3], count: u32, bias: f64) -> Rgb {
+    let mut sum = [0.0; 3];
+    for i in 0..count {
+        let light = sampling::sample_cosine(sampling::hammersley(i, count));
+        let level = filter_level(source, sampling::pdf_cosine(light[2]), count, bias);
+        add(&mut sum, 1.0, source.sample(in_world(sampling::orthonormal_basis, normal, light), level));
+    }
+    sum.map(|value| value / f64::from(count))
+}
+
+/// How a GGX level is sampled.
+#[derive(Clone, Copy)]
+pub struct Prefilter {
+    pub roughness: f64,
+    pub count: u32,
+    pub bias: f64,
+    pub basis: Basis,
+}
+
+pub fn prefilter(source: &Levels, normal: [f64; 3], how: &Prefilter) -> Rgb {
+    let alpha = how.roughness * how.roughness;
+    if alpha <= 1e-8 {
+        return source.sample(normal, 0.0);
+    }
+    let (mut sum, mut total) = ([0.0; 3], 0.0);
+    for i in 0..how.count {
+        let [x, y, z] = sampling::sample_ggx(sampling::hammersley(i, how.count), alpha);
+        let light = [2.0 * z * x, 2.0 * z * y, 2.0 * z * z - 1.0];
+        if light[2] > 0.0 {
+            let pdf = 0.25 * d_ggx(alpha, x * x + y * y);
+            let level = filter_level(source, pdf, how.count, how.bias);
+            add(&mut sum, light[2], source.sample(in_world(how.basis, normal, light), level));
+            total += light[2];
+        }
+    }
+    sum.map(|value| value / total)
+}
+
+/// [scale, bias] of the split sum.
+pub fn scale_bias(masking: Masking, n_dot_v: f64, roughness: f64, count: u32) -> [f64; 2] {
+    let alpha = roughness * roughness;
+    let sine = ((1.0 - n_dot_v) * (1.0 + n_dot_v)).sqrt();
+    let mut sum = [0.0; 2];
+    for i in 0..count {
+        let [x, _, z] = sampling::sample_ggx(sampling::hammersley(i, count), alpha);
+        let v_dot_h = (sine * x + n_dot_v * z).clamp(0.0, 1.0);
+        let n_dot_l = 2.0 * v_dot_h * z - n_dot_v;
+        if n_dot_l > 0.0 {
+            let weight = 4.0 * masking.scattered(alpha, n_dot_v, n_dot_l) * v_dot_h / z;
+            let fresnel = (1.0 - v_dot_h).powi(5);
+            sum[0] += weight * (1.0 - fresnel);
+            sum[1] += weight * fresnel;
+        }
+    }
+    sum.map(|value| value / f64::from(count))
+}
