@@ -14,7 +14,7 @@ use crate::passes::{Pass, Setting, sampler};
 use crate::support::{gpu, say};
 use crate::twins::{self, Prefilter, tutorial_basis};
 
-const WANTED: &str = "nobody cancels";
+pub const WANTED: &str = "nobody cancels";
 
 /// Lookups of mips of a few texels: drivers fill the corner where three faces meet in their own ways.
 const CORNERS: f64 = 2e-2;
@@ -22,7 +22,7 @@ const CORNERS: f64 = 2e-2;
 const EQUIRECT: f64 = 1e-2;
 
 /// A sky, a ground and three lamps, one of them on the wrap column.
-fn made() -> Panorama {
+pub fn made() -> Panorama {
     let (width, height) = (128, 64);
     let lamps = [([0.02, 0.3], 0.05, 40.0), ([0.6, 0.55], 0.08, 12.0), ([0.3, 0.05], 0.03, 90.0)];
     let lamps = lamps.map(|([u, v], radius, radiance)| (panorama_direction(u, v), radius, radiance));
@@ -69,7 +69,7 @@ fn studio() -> Option<Panorama> {
     Some(Panorama::new(Image::new(256, 128, rgb).unwrap()).unwrap())
 }
 
-fn panoramas() -> Vec<(&'static str, Panorama)> {
+pub fn panoramas() -> Vec<(&'static str, Panorama)> {
     let mut all = vec![("made", made())];
     all.extend(studio().map(|panorama| ("studio", panorama)));
     all
@@ -102,14 +102,14 @@ impl Found<'_> {
 }
 
 /// An environment as passes read it, and its exact maps.
-struct Environment {
-    levels: Levels,
-    texture: wgpu::Texture,
-    analysis: kiln_bake::Analysis,
+pub struct Environment {
+    pub levels: Levels,
+    pub texture: wgpu::Texture,
+    pub analysis: kiln_bake::Analysis,
 }
 
 impl Environment {
-    fn new(gpu: &Gpu, panorama: &Panorama, face_size: usize) -> Self {
+    pub fn new(gpu: &Gpu, panorama: &Panorama, face_size: usize) -> Self {
         let levels = Levels(kiln_bake::skybox(panorama, face_size, Cancel::NEVER).expect(WANTED));
         let texture = upload_cube(gpu, &levels);
         let request = AnalysisRequest { alpha_min: 0.01, sheen_alpha_min: None, error: 1e-5 };
@@ -169,7 +169,7 @@ fn cube_mips_are_their_twins() {
         let target = upload_cube(gpu, &Levels(exact.clone()));
         let twin = twins::with_mips(exact[0].clone(), true);
         let plain = twins::with_mips(exact[0].clone(), false);
-        for level in 1..exact.len() {
+        for (level, truth) in exact.iter().enumerate().skip(1) {
             let size = (32 >> level) as u32;
             let resources = [
                 ("faces", wgpu::BindingResource::TextureView(&level_view(&target, level))),
@@ -181,7 +181,7 @@ fn cube_mips_are_their_twins() {
                 map: &read_cube(gpu, &target, level),
                 twin: &twin.0[level],
                 wrong: &plain.0[level],
-                truth: &exact[level],
+                truth,
                 tolerance: 1e-5,
             }
             .check();
@@ -243,7 +243,13 @@ fn prefilter_is_its_twin() {
                 ("level_bias", Setting::F32(bias)),
             ];
             let roughness = f64::from(roughness);
-            let how = Prefilter { roughness, count, bias: f64::from(bias), basis: orthonormal_basis };
+            let how = Prefilter {
+                roughness,
+                count,
+                bias: f64::from(bias),
+                basis: orthonormal_basis,
+                offsets: [0.0; 2],
+            };
             let other = Prefilter { count: count / 2, ..how };
             let alpha = roughness * roughness;
             let truth =

@@ -63,15 +63,17 @@ fn texel(cube: &Cube, face: usize, x: f64, y: f64) -> Option<Rgb> {
     Some([0, 1, 2].map(|i| f64::from(cube.rgb[at + i])))
 }
 
-/// A panorama's bilinear value: repeats in u, clamps in v.
-pub fn panorama_bilinear(panorama: &Panorama, [u, v]: [f64; 2]) -> Rgb {
+/// A panorama's bilinear value: clamps in v, and in u unless it `repeats`.
+pub fn panorama_bilinear(panorama: &Panorama, [u, v]: [f64; 2], repeats: bool) -> Rgb {
     let (width, height) = (panorama.width(), panorama.height());
     let (x, y) = (u * width as f64 - 0.5, v * height as f64 - 0.5);
     let mut sum = [0.0; 3];
     for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
         let (column, row) = (x.floor() + dx, y.floor() + dy);
         let weight = (1.0 - (x - column).abs()) * (1.0 - (y - row).abs());
-        let column = column.rem_euclid(width as f64) as usize;
+        let column =
+            if repeats { column.rem_euclid(width as f64) } else { column.clamp(0.0, width as f64 - 1.0) }
+                as usize;
         let at = (row.clamp(0.0, height as f64 - 1.0) as usize * width + column) * 3;
         for (sum, &value) in sum.iter_mut().zip(&panorama.rgb()[at..at + 3]) {
             *sum += weight * f64::from(value);

@@ -5,10 +5,12 @@
 mod bakes;
 mod colour;
 mod cubes;
+mod fragment;
 mod functions;
 mod lobes;
 mod passes;
 mod reference;
 mod samples;
 mod support;
+mod tutorials;
 mod twins;

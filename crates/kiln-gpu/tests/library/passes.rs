@@ -12,19 +12,22 @@ pub struct Pass {
 }
 
 /// A member of a pass's settings.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub enum Setting {
     F32(f32),
     U32(u32),
     Matrix([[f32; 4]; 4]),
+    /// An array of vectors, or the columns of a smaller matrix, each in the room of four.
+    Vectors(Vec<[f32; 4]>),
 }
 
 impl Setting {
-    fn bytes(&self) -> &[u8] {
+    pub fn bytes(&self) -> &[u8] {
         match self {
             Self::F32(value) => bytemuck::bytes_of(value),
             Self::U32(value) => bytemuck::bytes_of(value),
             Self::Matrix(columns) => bytemuck::bytes_of(columns),
+            Self::Vectors(vectors) => bytemuck::cast_slice(vectors),
         }
     }
 }

@@ -24,6 +24,19 @@ pub fn tutorial_basis([x, y, z]: [f64; 3]) -> [[f64; 3]; 2] {
     [right, cross]
 }
 
+/// That of the tutorials' importance sampling: around +Z, and around +X where the normal is close to ±Z.
+pub fn z_up_basis([x, y, z]: [f64; 3]) -> [[f64; 3]; 2] {
+    let tangent = if z.abs() < 0.999 {
+        let length = x.hypot(y);
+        [-y / length, x / length, 0.0]
+    } else {
+        let length = y.hypot(z);
+        [0.0, -z / length, y / length]
+    };
+    let [a, b, c] = tangent;
+    [tangent, [y * c - z * b, z * a - x * c, x * b - y * a]]
+}
+
 /// A local direction in the world.
 fn in_world(basis: Basis, normal: [f64; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
     let [tangent, bitangent] = basis(normal);
@@ -34,6 +47,15 @@ fn add(sum: &mut Rgb, weight: f64, value: Rgb) {
     for (sum, value) in sum.iter_mut().zip(value) {
         *sum += weight * value;
     }
+}
+
+/// A tutorial's panorama on a cube: the centre column looks along +X, its angles are scaled by 0.1591 and 0.3183.
+pub fn tutorial_equirect(panorama: &Panorama, face_size: usize) -> Cube {
+    crate::cubes::cube_of(face_size, |[x, y, z]| {
+        let u = z.atan2(x) * 0.1591 + 0.5;
+        let from_below = y.clamp(-1.0, 1.0).asin() * 0.3183 + 0.5;
+        panorama_bilinear(panorama, [u, 1.0 - from_below], false)
+    })
 }
 
 /// (1 + s² + t²)^(−3/2).
@@ -52,7 +74,7 @@ pub fn equirect_to_cube(panorama: &Panorama, face_size: usize, samples_per_edge:
             let s = cube_texel_centre(face_size, x) + within(i % samples_per_edge);
             let t = cube_texel_centre(face_size, y) + within(i / samples_per_edge);
             let weight = jacobian(s, t);
-            add(&mut sum, weight, panorama_bilinear(panorama, panorama_uv(cube_direction(face, s, t))));
+            add(&mut sum, weight, panorama_bilinear(panorama, panorama_uv(cube_direction(face, s, t)), true));
             total += weight;
         }
         sum.map(|value| (value / total) as f32)
@@ -104,8 +126,11 @@ pub fn irradiance_grid(source: &Levels, basis: Basis, normal: [f64; 3], step: f6
 
 /// Level of the source at which a texel is as large as what a sample stands for.
 fn filter_level(source: &Levels, pdf: f64, count: u32, bias: f64) -> f64 {
+    level_of_share(source, 1.0 / (f64::from(count) * pdf).max(1e-12), bias)
+}
+
+fn level_of_share(source: &Levels, sample_sr: f64, bias: f64) -> f64 {
     let texel_sr = 4.0 * PI / (6.0 * (source.face_size() as f64).powi(2));
-    let sample_sr = 1.0 / (f64::from(count) * pdf).max(1e-12);
     (0.5 * (sample_sr / texel_sr).log2() + bias).max(0.0)
 }
 
@@ -126,6 +151,8 @@ pub struct Prefilter {
     pub count: u32,
     pub bias: f64,
     pub basis: Basis,
+    /// Added to densities, and to what a sample's share is one over of: tutorials have 0.0001 there.
+    pub offsets: [f64; 2],
 }
 
 pub fn prefilter(source: &Levels, normal: [f64; 3], how: &Prefilter) -> Rgb {
@@ -138,8 +165,8 @@ pub fn prefilter(source: &Levels, normal: [f64; 3], how: &Prefilter) -> Rgb {
         let [x, y, z] = sampling::sample_ggx(sampling::hammersley(i, how.count), alpha);
         let light = [2.0 * z * x, 2.0 * z * y, 2.0 * z * z - 1.0];
         if light[2] > 0.0 {
-            let pdf = 0.25 * d_ggx(alpha, x * x + y * y);
-            let level = filter_level(source, pdf, how.count, how.bias);
+            let pdf = 0.25 * d_ggx(alpha, x * x + y * y) + how.offsets[0];
+            let level = level_of_share(source, 1.0 / (f64::from(how.count) * pdf + how.offsets[1]), how.bias);
             add(&mut sum, light[2], source.sample(in_world(how.basis, normal, light), level));
             total += light[2];
         }
