@@ -8,7 +8,7 @@ use kiln_sphere::{panorama_direction, panorama_uv};
 
 use crate::cubes::{
     Difference, Levels, cube_of, cube_texture, cube_view, difference, flat_texture, level_view, read_cube,
-    read_image, upload_cube, upload_panorama,
+    read_image, upload_cube, upload_image,
 };
 use crate::passes::{Pass, Setting, sampler};
 use crate::support::{gpu, say};
@@ -137,7 +137,7 @@ fn equirect_to_cube_is_its_twin() {
     let Some(gpu) = gpu() else { return };
     let pass = Pass::new(gpu, "shaders/bake/equirect_to_cube.wgsl", "main", &[]);
     for (name, panorama) in panoramas() {
-        let source = upload_panorama(gpu, &panorama);
+        let source = upload_image(gpu, panorama.width(), panorama.rgb());
         let truth = &kiln_bake::skybox(&panorama, 32, Cancel::NEVER).expect(WANTED)[0];
         for count in [1, 8] {
             let target = cube_texture(gpu, 32, 1);

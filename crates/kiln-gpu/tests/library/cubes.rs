@@ -63,23 +63,26 @@ fn texel(cube: &Cube, face: usize, x: f64, y: f64) -> Option<Rgb> {
     Some([0, 1, 2].map(|i| f64::from(cube.rgb[at + i])))
 }
 
-/// A panorama's bilinear value: clamps in v, and in u unless it `repeats`.
-pub fn panorama_bilinear(panorama: &Panorama, [u, v]: [f64; 2], repeats: bool) -> Rgb {
-    let (width, height) = (panorama.width(), panorama.height());
-    let (x, y) = (u * width as f64 - 0.5, v * height as f64 - 0.5);
+/// A picture's bilinear value at (u, v) from its top left: clamps in v, and in u unless it `repeats`.
+pub fn image_bilinear(width: usize, rgb: &[f32], [u, v]: [f64; 2], repeats: bool) -> Rgb {
+    let (columns, rows) = (width as f64, (rgb.len() / 3 / width) as f64);
+    let (x, y) = (u * columns - 0.5, v * rows - 0.5);
     let mut sum = [0.0; 3];
     for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
         let (column, row) = (x.floor() + dx, y.floor() + dy);
         let weight = (1.0 - (x - column).abs()) * (1.0 - (y - row).abs());
-        let column =
-            if repeats { column.rem_euclid(width as f64) } else { column.clamp(0.0, width as f64 - 1.0) }
-                as usize;
-        let at = (row.clamp(0.0, height as f64 - 1.0) as usize * width + column) * 3;
-        for (sum, &value) in sum.iter_mut().zip(&panorama.rgb()[at..at + 3]) {
+        let column = if repeats { column.rem_euclid(columns) } else { column.clamp(0.0, columns - 1.0) };
+        let at = (row.clamp(0.0, rows - 1.0) as usize * width + column as usize) * 3;
+        for (sum, &value) in sum.iter_mut().zip(&rgb[at..at + 3]) {
             *sum += weight * f64::from(value);
         }
     }
     sum
+}
+
+/// As [`image_bilinear`].
+pub fn panorama_bilinear(panorama: &Panorama, uv: [f64; 2], repeats: bool) -> Rgb {
+    image_bilinear(panorama.width(), panorama.rgb(), uv, repeats)
 }
 
 /// A cube of what `radiance` says in the direction of each texel.
@@ -166,9 +169,10 @@ pub fn upload_cube(gpu: &Gpu, levels: &Levels) -> wgpu::Texture {
     texture
 }
 
-pub fn upload_panorama(gpu: &Gpu, panorama: &Panorama) -> wgpu::Texture {
-    let texture = flat_texture(gpu, panorama.width(), panorama.height());
-    write(gpu, &texture, 0, [panorama.width(), panorama.height(), 1], panorama.rgb());
+pub fn upload_image(gpu: &Gpu, width: usize, rgb: &[f32]) -> wgpu::Texture {
+    let height = rgb.len() / 3 / width;
+    let texture = flat_texture(gpu, width, height);
+    write(gpu, &texture, 0, [width, height, 1], rgb);
     texture
 }
 

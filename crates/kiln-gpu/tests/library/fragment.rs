@@ -219,18 +219,18 @@ impl Program {
 fn uniform(binding: &kiln_shader::Binding, scene: &Scene<'_>) -> Vec<u8> {
     let BindingKind::Uniform { size_bytes, members } = &binding.kind else { return vec![0; 4] };
     let mut bytes = vec![0; *size_bytes as usize];
-    let mut put = |name: &str, offset: usize| {
+    // A three-component vector comes in the room of four, whose last may be the next member's.
+    let mut put = |name: &str, offset: u32, size: u32| {
         let found = scene.values.iter().find(|(value, _)| *value == name);
         let (_, value) = found.unwrap_or_else(|| panic!("no value is called {name}"));
-        let value = value.bytes();
-        let end = (offset + value.len()).min(bytes.len());
-        bytes[offset..end].copy_from_slice(&value[..end - offset]);
+        let (start, count) = (offset as usize, value.bytes().len().min(size as usize));
+        bytes[start..start + count].copy_from_slice(&value.bytes()[..count]);
     };
     if members.is_empty() {
-        put(&binding.name, 0);
+        put(&binding.name, 0, *size_bytes);
     }
     for member in members {
-        put(&member.name, member.offset_bytes as usize);
+        put(&member.name, member.offset_bytes, member.size_bytes);
     }
     bytes
 }

@@ -9,11 +9,11 @@ use kiln_gpu::Gpu;
 use kiln_image::{Cube, Image, Panorama};
 
 use crate::bakes::{Environment, WANTED, made, panoramas};
-use crate::cubes::{cube_of, cube_view, difference};
-use crate::fragment::{Program, Scene};
+use crate::cubes::{cube_of, cube_view, difference, flat_texture, read_image, upload_image};
+use crate::fragment::{Program, Scene, screen};
 use crate::passes::{Setting, sampler};
-use crate::support::{compile, gpu, say};
-use crate::twins::{self, Prefilter, tutorial_basis, z_up_basis};
+use crate::support::{compile, gpu, say, unit};
+use crate::twins::{self, Prefilter, Surface, tutorial_basis, z_up_basis};
 
 /// The same sky seen with the tutorials' convention: their centre column looks along +X.
 fn turned(panorama: &Panorama) -> Panorama {
@@ -155,4 +155,144 @@ fn fragment_pass_draws_what_the_compute_pass_writes() {
     let twin = |count| cube_of(8, |normal| twins::irradiance_cosine(&environment.levels, normal, count, 0.0));
     let [right, wrong] = [twin(64), twin(32)].map(|twin| difference(&drawn, &twin));
     assert!(right.worst <= 5e-4 && wrong.worst > 5e-4, "{right:?} {wrong:?}");
+}
+
+/// `pbr.frag` with the library's functions: textures and uniforms have its names.
+const PBR: &str = "
+import lib::brdf::{d_ggx, diffuse_lambert, f_schlick, f_schlick_roughness, schlick_k_light, v_schlick_ggx};
+import lib::colour::tone_map_reinhard;
+struct Surface {
+    lightPositions: array<vec3f, 4>,
+    lightColors: array<vec3f, 4>,
+    camPos: vec3f,
+    albedo: vec3f,
+    normal: vec3f,
+    metallic: f32,
+    roughness: f32,
+    occlusion: f32,
+}
+@group(0) @binding(0) var<uniform> surface: Surface;
+@group(0) @binding(1) var irradianceMap: texture_cube<f32>;
+@group(0) @binding(2) var prefilterMap: texture_cube<f32>;
+@group(0) @binding(3) var brdfLUT: texture_2d<f32>;
+@group(0) @binding(4) var linear: sampler;
+struct Varying { @builtin(position) position: vec4f, @location(0) world: vec3f }
+@vertex
+fn vs_main(@location(0) aPos: vec3f) -> Varying {
+    return Varying(vec4f(aPos, 1.0), aPos);
+}
+fn lit(view: vec3f, f0: vec3f, to_light: vec3f, color: vec3f) -> vec3f {
+    let n = surface.normal;
+    let light = normalize(to_light);
+    let h = normalize(view + light);
+    let n_dot_l = saturate(dot(n, light));
+    let n_cross_h = cross(n, h);
+    let d = d_ggx(saturate(dot(n, h)), dot(n_cross_h, n_cross_h), surface.roughness * surface.roughness);
+    let v = v_schlick_ggx(n_dot_l, saturate(dot(n, view)), schlick_k_light(surface.roughness));
+    let f = f_schlick(f0, 1.0, dot(h, view));
+    let diffuse = (1.0 - f) * (1.0 - surface.metallic) * surface.albedo * diffuse_lambert();
+    return (diffuse + d * v * f) * color * (n_dot_l / dot(to_light, to_light));
+}
+@fragment
+fn fs_main(in: Varying) -> @location(0) vec4f {
+    let n = surface.normal;
+    let view = normalize(surface.camPos - in.world);
+    let n_dot_v = saturate(dot(n, view));
+    let f0 = mix(vec3f(0.04), surface.albedo, surface.metallic);
+    let f = f_schlick_roughness(f0, n_dot_v, surface.roughness);
+    let irradiance = textureSampleLevel(irradianceMap, linear, n, 0.0).rgb;
+    let prefiltered = textureSampleLevel(prefilterMap, linear, reflect(-view, n), 4.0 * surface.roughness).rgb;
+    let table = textureSampleLevel(brdfLUT, linear, vec2f(n_dot_v, surface.roughness), 0.0);
+    let diffuse = (1.0 - f) * (1.0 - surface.metallic) * irradiance * surface.albedo;
+    var sum = (diffuse + prefiltered * (f * table.x + table.y)) * surface.occlusion;
+    for (var i = 0u; i < 4u; i++) {
+        sum += lit(view, f0, surface.lightPositions[i] - in.world, surface.lightColors[i]);
+    }
+    return vec4f(pow(max(tone_map_reinhard(sum), vec3f(1e-6)), vec3f(1.0 / 2.2)), 1.0);
+}";
+
+const LIGHTS: [([f64; 3], [f64; 3]); 4] = [
+    ([-1.0, 1.0, 1.5], [9.0, 7.0, 5.0]),
+    ([1.0, 1.0, 0.5], [3.0, 3.0, 3.0]),
+    ([-1.5, -1.0, 0.75], [0.5, 2.0, 4.0]),
+    ([2.0, -1.0, 3.0], [30.0, 30.0, 30.0]),
+];
+
+fn padded([x, y, z]: [f64; 3]) -> [f32; 4] {
+    [x as f32, y as f32, z as f32, 0.0]
+}
+
+/// The table of the tutorials, exact.
+fn tutorial_table() -> Vec<f32> {
+    let kind = kiln_bake::Table::GgxScaleBias(Masking::SchlickIbl);
+    let values = kiln_bake::table(kind, kiln_bake::TableAxes::Uniform, 32, Cancel::NEVER).expect(WANTED);
+    values.chunks_exact(2).flat_map(|entry| [entry[0], entry[1], 0.0]).collect()
+}
+
+#[test]
+fn tutorial_shading_in_the_library_functions_is_its_twin() {
+    let Some(gpu) = gpu() else { return };
+    let environment = Environment::new(gpu, &made(), 32);
+    let table = tutorial_table();
+    let program = Program::new(gpu, compile("shaders/test/root.wgsl", Some(PBR), &[]));
+    for (metallic, roughness) in [(0.0, 0.25), (0.0, 0.5), (1.0, 0.25), (0.5, 1.0)] {
+        let surface = |offset: f64| Surface {
+            albedo: [0.5, 0.25, 0.75],
+            metallic,
+            roughness,
+            occlusion: 0.75,
+            normal: unit([0.1, -0.2, 1.0]).map(|x| f64::from(x as f32)),
+            // Close above the surface, so that most of it is seen under grazing angles.
+            camera: [0.0, 0.0, 0.4],
+            lights: LIGHTS,
+            irradiance: &environment.levels,
+            prefiltered: &environment.levels,
+            table: (32, &table),
+            offset,
+        };
+        // As good as none, but for lights behind the surface: 0/0.
+        let bound = surface(1e-300);
+        let number = |value: f64| Setting::F32(value as f32);
+        let scene = Scene {
+            attributes: vec![("aPos", 3, screen().0), ("aTexCoords", 2, screen().1)],
+            textures: vec![
+                ("irradianceMap", cube_view(&environment.texture)),
+                ("prefilterMap", cube_view(&environment.texture)),
+                ("brdfLUT", upload_image(gpu, 32, &table).create_view(&Default::default())),
+            ],
+            sampler: sampler(gpu, false),
+            values: vec![
+                ("lightPositions", Setting::Vectors(LIGHTS.map(|(at, _)| padded(at)).to_vec())),
+                ("lightColors", Setting::Vectors(LIGHTS.map(|(_, color)| padded(color)).to_vec())),
+                ("camPos", Setting::Vectors(vec![padded(bound.camera)])),
+                ("albedo", Setting::Vectors(vec![padded(bound.albedo)])),
+                ("normal", Setting::Vectors(vec![padded(bound.normal)])),
+                ("metallic", number(metallic)),
+                ("roughness", number(roughness)),
+                ("occlusion", number(bound.occlusion)),
+            ],
+        };
+        let target = flat_texture(gpu, 24, 24);
+        program.draw(gpu, &scene, &target.create_view(&Default::default()), target.format());
+        let picture = read_image(gpu, &target);
+        let worst = |surface: &Surface<'_>| {
+            let error = |index: usize| {
+                let (x, y) = (index % 24, index / 24);
+                let at = [(2 * x + 1) as f64 / 24.0 - 1.0, 1.0 - (2 * y + 1) as f64 / 24.0, 0.0];
+                let expected = surface.display(at);
+                let off =
+                    picture.texel(x, y).into_iter().zip(expected).map(|(a, e)| (f64::from(a) - e).abs());
+                off.fold(0.0, |worst: f64, off| if off.is_nan() { f64::INFINITY } else { worst.max(off) })
+            };
+            (0..24 * 24).map(error).fold(0.0, f64::max)
+        };
+        let (twin, offset) = (worst(&bound), worst(&surface(1e-4)));
+        let another = worst(&Surface { roughness: roughness * 0.99, ..surface(1e-300) });
+        say(&format!(
+            "tutorial's pbr, metallic {metallic}, roughness {roughness}: display values, twin {twin:.1e} (tolerance 1e-3, \
+             another {another:.1e}); 0.0001 in the denominator moves them by {offset:.1e}"
+        ));
+        // Mips of a few texels: drivers fill the corner where three faces meet in their own ways.
+        assert!(twin <= 1e-3 && another > 1e-3, "metallic {metallic}, roughness {roughness}");
+    }
 }

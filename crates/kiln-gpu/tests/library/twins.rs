@@ -7,7 +7,8 @@ use kiln_image::{Cube, Panorama};
 use kiln_sphere::direction::cube_texel_centre;
 use kiln_sphere::{cube_direction, panorama_uv};
 
-use crate::cubes::{Levels, Rgb, panorama_bilinear};
+use crate::cubes::{Levels, Rgb, image_bilinear, panorama_bilinear};
+use crate::support::unit;
 
 /// Tangent and bitangent of a normal.
 pub type Basis = fn([f64; 3]) -> [[f64; 3]; 2];
@@ -50,6 +51,10 @@ fn add(sum: &mut Rgb, weight: f64, value: Rgb) {
 }
 
 /// A tutorial's panorama on a cube: the centre column looks along +X, its angles are scaled by 0.1591 and 0.3183.
+#[expect(
+    clippy::approx_constant,
+    reason = "tutorials type four digits of 1/π, and their error is what is measured"
+)]
 pub fn tutorial_equirect(panorama: &Panorama, face_size: usize) -> Cube {
     crate::cubes::cube_of(face_size, |[x, y, z]| {
         let u = z.atan2(x) * 0.1591 + 0.5;
@@ -108,6 +113,78 @@ pub fn with_mips(cube: Cube, weighted: bool) -> Levels {
         levels.push(half_size(&levels[levels.len() - 1], weighted));
     }
     Levels(levels)
+}
+
+/// A flat surface of one material under four lights and an environment, as the tutorials' `pbr.frag` shades it.
+pub struct Surface<'a> {
+    pub albedo: Rgb,
+    pub metallic: f64,
+    pub roughness: f64,
+    pub occlusion: f64,
+    pub normal: [f64; 3],
+    pub camera: [f64; 3],
+    /// Position and colour.
+    pub lights: [([f64; 3], Rgb); 4],
+    pub irradiance: &'a Levels,
+    pub prefiltered: &'a Levels,
+    /// Width and texels of the split sum's table.
+    pub table: (usize, &'a [f32]),
+    /// Added to 4 n·l n·v before dividing by it: 0.0001 in tutorials.
+    pub offset: f64,
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| a[i] - b[i])
+}
+
+impl Surface<'_> {
+    /// What a display is sent: Reinhard's curve and a gamma of 2.2.
+    pub fn display(&self, position: [f64; 3]) -> Rgb {
+        self.radiance(position).map(|value| (value / (value + 1.0)).powf(1.0 / 2.2))
+    }
+
+    fn radiance(&self, position: [f64; 3]) -> Rgb {
+        let view = unit(minus(self.camera, position));
+        let n_dot_v = dot(self.normal, view).max(0.0);
+        let f0 = self.albedo.map(|albedo| 0.04 + (albedo - 0.04) * self.metallic);
+        let mut sum = self.ambient(view, n_dot_v, f0);
+        let k = (self.roughness + 1.0).powi(2) / 8.0;
+        let g = |cosine: f64| cosine / (cosine * (1.0 - k) + k);
+        for (at, color) in self.lights {
+            let to_light = minus(at, position);
+            let light = unit(to_light);
+            let half = unit([0, 1, 2].map(|i| view[i] + light[i]));
+            let n_dot_l = dot(self.normal, light).max(0.0);
+            let n_dot_h = dot(self.normal, half).max(0.0);
+            let alpha = self.roughness * self.roughness;
+            let d = d_ggx(alpha, 1.0 - n_dot_h * n_dot_h);
+            let specular = d * g(n_dot_v) * g(n_dot_l) / (4.0 * n_dot_v * n_dot_l + self.offset);
+            let grazing = (1.0 - dot(half, view).max(0.0)).powi(5);
+            for i in 0..3 {
+                let fresnel = f0[i] + (1.0 - f0[i]) * grazing;
+                let diffuse = (1.0 - fresnel) * (1.0 - self.metallic) * self.albedo[i] / PI;
+                sum[i] += (diffuse + specular * fresnel) * color[i] / dot(to_light, to_light) * n_dot_l;
+            }
+        }
+        sum
+    }
+
+    fn ambient(&self, view: [f64; 3], n_dot_v: f64, f0: Rgb) -> Rgb {
+        let grazing = (1.0 - n_dot_v).powi(5);
+        let mirrored = [0, 1, 2].map(|i| 2.0 * dot(self.normal, view) * self.normal[i] - view[i]);
+        let irradiance = self.irradiance.sample(self.normal, 0.0);
+        let prefiltered = self.prefiltered.sample(mirrored, 4.0 * self.roughness);
+        let [scale, bias, _] = image_bilinear(self.table.0, self.table.1, [n_dot_v, self.roughness], false);
+        std::array::from_fn(|i| {
+            let fresnel = f0[i] + ((1.0 - self.roughness).max(f0[i]) - f0[i]) * grazing;
+            let diffuse = (1.0 - fresnel) * (1.0 - self.metallic) * irradiance[i] * self.albedo[i];
+            (diffuse + prefiltered[i] * (fresnel * scale + bias)) * self.occlusion
+        })
+    }
 }
 
 pub fn irradiance_grid(source: &Levels, basis: Basis, normal: [f64; 3], step: f64) -> Rgb {
