@@ -157,6 +157,13 @@ fn f0_of_ior(ior: f32) -> f32 {
     return ratio * ratio;
 }
 
+// Schlick's term solved for f0: what gives reflectance `f` at this angle. At grazing angles, where every f0 gives f90, the
+// result is bounded.
+fn f0_of_schlick(f: vec3f, f90: f32, v_dot_h: f32) -> vec3f {
+    let weight = min(one_minus_pow5(v_dot_h), 0.9999);
+    return saturate((f - f90 * weight) / (1.0 - weight));
+}
+
 // Widens alpha² by the normal's variation within a pixel. Tokuyoshi and Kaplanyan 2019, "Improved Geometric
 // Specular Antialiasing": pixel filter variance 1/2π, widening at most 0.18. Call it in uniform control flow.
 fn alpha2_filtered(alpha2: f32, normal: vec3f) -> f32 {

@@ -67,7 +67,7 @@ impl Gpu {
         error.map_or(Ok(()), |reason| Err(GpuError::Pass { reason }))
     }
 
-    /// A buffer of `bytes`, which `usage` may be read back from if it has `COPY_SRC`.
+    /// A buffer that holds `bytes`; [`Gpu::read_buffer`] reads it back if `usage` has `COPY_SRC`.
     pub fn buffer(&self, bytes: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
         self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
             label: None,

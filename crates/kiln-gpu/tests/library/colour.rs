@@ -104,6 +104,15 @@ fn colour_spaces_agree_with_their_twins() {
             least: 1e-3,
         },
         Comparison {
+            function: "lib::colour::within_f16",
+            call: "vec4f(within_f16(a.xyz), 0.0)",
+            arguments: grid(&[&[-1.0, 0.0, 0.5, 65504.0, 1e9], &[0.0, 3.0e38], &[1.0]]),
+            truth: |a| each(a, |x| x.clamp(0.0, 65504.0)),
+            wrong: |a| each(a, |x| x),
+            tolerance: 0.0,
+            least: 1.0,
+        },
+        Comparison {
             function: "lib::colour::luminance",
             call: "vec4f(luminance(a.xyz), 0.0, 0.0, 0.0)",
             arguments: colours(),

@@ -211,12 +211,47 @@ fn parts_of_materials_and_lookups_agree_with_their_twins() {
             least: 1.0,
         },
         Comparison {
+            function: "lib::material::{TangentFrame, mapped_normal}",
+            call: "vec4f(mapped_normal(TangentFrame(a.xyz, vec4f(0.0, 0.6, 0.8, -1.0)), b.xyz, a.w), 0.0)",
+            arguments: with_directions(&[
+                [1.0, 0.5, 0.5, 1.0, 0.0],
+                [0.5, 0.25, 0.75, 0.875, 0.0],
+                [1.0, 0.5, 0.5, 0.5, 0.0],
+                [0.0, 1.0, 1.0, 1.0, 0.0],
+            ]),
+            truth: |a| padded(mapped(a, -1.0)),
+            wrong: |a| padded(mapped(a, 1.0)),
+            tolerance: 2e-6,
+            least: 1.0,
+        },
+        Comparison {
+            function: "lib::material::texture_coordinate",
+            call: "vec4f(texture_coordinate(vec4f(2.0, 0.5, 0.25, a.z), vec4f(-0.5, 3.0, 1.0, a.z), a.xy, vec2f(a.y, 7.0)), 0.0, 0.0)",
+            arguments: grid(&[&[-1.0, 0.0, 0.3], &[0.0, 0.7], &[0.0, 1.0]]),
+            truth: |a| {
+                let [u, v] = if a[2] > 0.5 { [a[1], 7.0] } else { [a[0], a[1]] };
+                [2.0 * u + 0.5 * v + 0.25, 3.0 * v - 0.5 * u + 1.0, 0.0, 0.0]
+            },
+            wrong: |a| [2.0 * a[0] + 0.5 * a[1] + 0.25, 3.0 * a[1] - 0.5 * a[0] + 1.0, 0.0, 0.0],
+            tolerance: 1e-6,
+            least: 1.0,
+        },
+        Comparison {
+            function: "lib::fullscreen::fullscreen_position",
+            call: "vec4f(fullscreen_position(u32(a.x)), 0.0, 0.0)",
+            arguments: grid(&[&[0.0, 1.0, 2.0]]),
+            truth: |a| [[-1.0, -1.0, 0.0, 0.0], [3.0, -1.0, 0.0, 0.0], [-1.0, 3.0, 0.0, 0.0]][a[0] as usize],
+            wrong: |a| [[-1.0, -1.0, 0.0, 0.0], [1.0, -1.0, 0.0, 0.0], [-1.0, 1.0, 0.0, 0.0]][a[0] as usize],
+            tolerance: 0.0,
+            least: 1.0,
+        },
+        Comparison {
             function: "lib::vector::{max_component, normalize_or, one_minus_pow5}",
-            call: "vec4f(normalize_or(a.xyz * a.w, vec3f(0.0, 1.0, 0.0)), one_minus_pow5(a.x))",
+            call: "vec4f(normalize_or(a.xyz * a.w, vec3f(0.0, 1.0, 0.0)), one_minus_pow5(max_component(a.xyz)))",
             arguments: with_directions(&[[0.0; 5], [1.0; 5], [1e-12; 5], [1e-16; 5], [1e15; 5]]),
             truth: |a| {
                 let [x, y, z] = if a[3] < 1e-15 { [0.0, 1.0, 0.0] } else { unit(direction(a)) };
-                [x, y, z, (1.0 - a[0]).clamp(0.0, 1.0).powi(5)]
+                [x, y, z, (1.0 - a[0].max(a[1]).max(a[2])).clamp(0.0, 1.0).powi(5)]
             },
             wrong: |a| {
                 let [x, y, z] = unit(direction(a));
@@ -278,6 +313,16 @@ fn parts_of_materials_and_lookups_agree_with_their_twins() {
             least: 1.0,
         },
     ]);
+}
+
+/// A normal map's texel b in the frame of normal a and tangent (0, 0.6, 0.8), scaled by a.w.
+fn mapped(a: Arguments, sign: f64) -> [f64; 3] {
+    let (n, t) = (direction(a), [0.0, f64::from(0.6_f32), f64::from(0.8_f32)]);
+    let b = [n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]];
+    let texel = [(2.0 * a[4] - 1.0) * a[3], (2.0 * a[5] - 1.0) * a[3], 2.0 * a[6] - 1.0];
+    let sum = std::array::from_fn(|i| texel[0] * t[i] + texel[1] * sign * b[i] + texel[2] * n[i]);
+    let length2: f64 = sum.iter().map(|x: &f64| x * x).sum();
+    if length2 < 1e-30 { unit(n) } else { unit(sum) }
 }
 
 fn albedo(a: Arguments) -> [f64; 4] {

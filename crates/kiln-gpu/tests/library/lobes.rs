@@ -245,6 +245,18 @@ fn fresnel_and_diffuse_terms_are_right_at_and_beyond_one() {
             least: 1e-3,
         },
         Comparison {
+            function: "lib::brdf::f0_of_schlick",
+            call: "vec4f(f0_of_schlick(vec3f(a.z + (a.y - a.z) * a.w, 0.0, 1.0), a.y, a.x), 0.0)",
+            arguments: schlick_and_weights(),
+            truth: |a| {
+                let solved = |f: f64| ((f - a[1] * weight(a[0])) / (1.0 - weight(a[0]))).clamp(0.0, 1.0);
+                [solved(a[2] + (a[1] - a[2]) * a[3]), solved(0.0), solved(1.0), 0.0]
+            },
+            wrong: |a| [a[2] + (a[1] - a[2]) * a[3], 0.0, 1.0, 0.0],
+            tolerance: 3e-6,
+            least: 1.0,
+        },
+        Comparison {
             function: "lib::brdf::f0_of_ior",
             call: "vec4f(f0_of_ior(a.x), 0.0, 0.0, 0.0)",
             arguments: grid(&[&[0.0, 0.5, 1.0, 1.1, 1.33, 1.5, 2.42, 100.0]]),
@@ -284,6 +296,15 @@ fn fresnel_and_diffuse_terms_are_right_at_and_beyond_one() {
             least: 0.1,
         },
     ]);
+}
+
+/// Cosine, f90, f0 and Schlick's weight of the cosine, from 0.1 on: below, every f0 gives nearly f90.
+fn schlick_and_weights() -> Vec<[f32; 8]> {
+    let mut all = grid(&[&[0.1, 0.3, 0.6, 0.9, 1.0], &[0.5, 1.0], &[0.0, 0.04, 0.5]]);
+    for arguments in &mut all {
+        arguments[3] = weight(f64::from(arguments[0])) as f32;
+    }
+    all
 }
 
 #[test]

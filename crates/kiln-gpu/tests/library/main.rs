@@ -4,6 +4,7 @@
 
 mod bakes;
 mod colour;
+mod complete;
 mod cubes;
 mod fragment;
 mod functions;

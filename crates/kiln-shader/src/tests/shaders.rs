@@ -5,11 +5,15 @@ use std::collections::BTreeSet;
 use super::{Files, compiled, set};
 use crate::{BindingKind, Compiled, Reflection, scan_dependencies};
 
-const FEATURES: [&str; 11] = [
+const FEATURES: [&str; 16] = [
     "alpha_blend",
     "alpha_mask",
+    "anisotropy",
     "clearcoat",
+    "diffuse_transmission",
+    "dispersion",
     "emission",
+    "iridescence",
     "normal_map",
     "occlusion",
     "sheen",
@@ -17,13 +21,18 @@ const FEATURES: [&str; 11] = [
     "transmission",
     "unlit",
     "vertex_color",
+    "volume",
 ];
 
 /// Names of the interface that belong to one feature, by what they start with.
-const OWNED: [(&str, &str); 13] = [
+const OWNED: [(&str, &str); 20] = [
     ("alpha_mask", "alpha_cutoff"),
+    ("anisotropy", "anisotropy_"),
     ("clearcoat", "clearcoat_"),
+    ("diffuse_transmission", "diffuse_transmission_"),
+    ("dispersion", "dispersion"),
     ("emission", "emissive_"),
+    ("iridescence", "iridescence_"),
     ("normal_map", "normal_texture"),
     ("normal_map", "normal_scale"),
     ("normal_map", "normal_uv_"),
@@ -34,6 +43,9 @@ const OWNED: [(&str, &str); 13] = [
     ("specular", "specular_factor"),
     ("specular", "specular_color_"),
     ("transmission", "transmission_"),
+    ("volume", "attenuation_color"),
+    ("volume", "attenuation_distance"),
+    ("volume", "thickness_factor"),
 ];
 
 /// Every file of the repository's `shaders/lib`, `shaders/pbr` and `shaders/bake`.
@@ -111,10 +123,15 @@ fn leftovers_finds_a_symbol_of_an_absent_feature() {
 
 #[test]
 fn each_feature_changes_the_canonical_text() {
-    let plain = material(&[]);
-    for feature in FEATURES {
-        assert_ne!(material(&[feature]).wgsl, plain.wgsl, "{feature} does nothing");
+    let lit: Vec<&str> = FEATURES.iter().copied().filter(|name| *name != "unlit").collect();
+    let all = material(&lit);
+    for feature in &lit {
+        // Beside all others: a volume, for one, does nothing to what lets no light through.
+        let others: Vec<&str> = lit.iter().copied().filter(|name| name != feature).collect();
+        assert_ne!(material(&others).wgsl, all.wgsl, "{feature} does nothing");
     }
+    assert_ne!(material(&["unlit"]).wgsl, material(&[]).wgsl);
+    assert_eq!(material(&["volume"]).wgsl, material(&[]).wgsl, "an opaque thing has no inside");
 }
 
 #[test]
