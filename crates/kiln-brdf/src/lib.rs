@@ -2,19 +2,20 @@
 //!
 //! Start at [`dfg`], the split-sum integral of the specular lobe, or at [`d_ggx`] for the lobe itself. [`sheen_albedo`]
 //! is the sheen lobe's, [`albedo_average`] what multiple scattering needs besides, [`fit_error`] says what a
-//! closed-form fit costs.
+//! closed-form fit costs. [`sampling`] draws from the lobes.
 //!
 //! Conventions: α = perceptual roughness²; cosines are named for their vectors (`n_dot_v`, `n_dot_l`, `n_dot_h`,
 //! `v_dot_h`) and lie in [0, 1]; V is the visibility G / (4 n·l n·v), so a lobe is D · V · F. All values are `f64`,
 //! transcendental functions come from `libm`, so that results have the same bits on every machine.
 //!
-//! Not here: sampling estimators (`kiln-sample`), prefiltering and tables (`kiln-bake`), WGSL (`shaders/`).
+//! Not here: prefiltering and tables (`kiln-bake`), WGSL (`shaders/`).
 
 mod circles;
 mod dfg;
 mod fits;
 mod lobes;
 mod quadrature;
+pub mod sampling;
 mod sheen;
 #[cfg(test)]
 mod tests;

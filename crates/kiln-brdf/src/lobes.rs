@@ -58,7 +58,7 @@ impl Masking {
         [Self::SmithCorrelated, Self::SmithSeparable, Self::SchlickIbl, Self::SchlickLights];
 
     /// V · n·l, finite for α > 0.
-    pub(crate) fn scattered(self, alpha: f64, n_dot_v: f64, n_dot_l: f64) -> f64 {
+    pub fn scattered(self, alpha: f64, n_dot_v: f64, n_dot_l: f64) -> f64 {
         match self {
             // 0/0 where both cosines are 0.
             Self::SmithCorrelated => {
@@ -90,7 +90,7 @@ impl Masking {
 }
 
 /// 2x / G_1(x) of Smith's masking for GGX: x + √(α² + (1 − α²) x²).
-fn smith_half(alpha: f64, cosine: f64) -> f64 {
+pub(crate) fn smith_half(alpha: f64, cosine: f64) -> f64 {
     let alpha2 = alpha * alpha;
     cosine + (alpha2 + (1.0 - alpha2) * cosine * cosine).sqrt()
 }

@@ -1,4 +1,4 @@
-//! The one wgpu device: adapter choice, errors as data, readback.
+//! The one wgpu device: adapter choice, errors as data, compute passes, readback.
 //!
 //! Start at [`Gpu::headless`] for work without a window, or [`Gpu::from_parts`] where a window system made
 //! the device (give it [`choose_adapter`] and [`device_descriptor`], so that both ways end at the same one).
@@ -12,7 +12,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 pub use adapter::{FoundAdapter, choose_adapter, describe_adapter, device_descriptor, list_adapters};
 
+pub use compute::ComputePass;
+
 mod adapter;
+mod compute;
 mod readback;
 #[cfg(test)]
 mod tests;
@@ -43,6 +46,12 @@ pub enum GpuError {
         format: String,
         /// More than 1 cannot be copied.
         sample_count: u32,
+    },
+    /// A compute pass, or what was bound to it, is not what the device takes.
+    #[error("the graphics device refuses a compute pass: {reason}")]
+    Pass {
+        /// What wgpu said.
+        reason: String,
     },
     /// The copy or the map failed; the device is most likely lost.
     #[error("reading back from the graphics device failed: {reason}")]

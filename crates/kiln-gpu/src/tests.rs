@@ -81,6 +81,24 @@ fn read_texture_refuses_multisampled_and_depth_textures() {
 }
 
 #[test]
+fn compute_pass_doubles_numbers_and_faults_are_errors() {
+    let Some(gpu) = gpu() else { return };
+    let wgsl = "override factor: u32;
+        @group(0) @binding(3) var<storage, read_write> numbers: array<u32>;
+        @compute @workgroup_size(2) fn main(@builtin(global_invocation_id) id: vec3u) { numbers[id.x] *= factor; }";
+    let pass = gpu.compute_pass(wgsl, "main", &[("factor", 2.0)]).unwrap();
+    let numbers: Vec<u8> = [1u32, 2, 3, 4].iter().flat_map(|number| number.to_le_bytes()).collect();
+    let buffer = gpu.buffer(&numbers, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
+    let at = |binding| [wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() }];
+    assert_eq!(gpu.run_pass(&pass, &at(3), [2, 1, 1]), Ok(()));
+    assert_eq!(gpu.read_buffer(&buffer).unwrap(), [2, 0, 0, 0, 4, 0, 0, 0, 6, 0, 0, 0, 8, 0, 0, 0]);
+    assert!(matches!(gpu.run_pass(&pass, &at(4), [1, 1, 1]), Err(GpuError::Pass { .. })));
+    let missing = gpu.compute_pass(wgsl, "other", &[("factor", 2.0)]);
+    assert!(matches!(missing, Err(GpuError::Pass { .. })));
+    assert_eq!(gpu.take_errors(), Vec::<String>::new());
+}
+
+#[test]
 fn invalid_use_inside_a_scope_is_returned_and_outside_is_logged() {
     let Some(gpu) = gpu() else { return };
     let no_usage = wgpu::BufferDescriptor {

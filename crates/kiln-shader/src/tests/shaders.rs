@@ -5,11 +5,15 @@ use std::collections::BTreeSet;
 use super::{Files, compiled, set};
 use crate::{BindingKind, Compiled, Program, Reflection, scan};
 
-pub(super) const FEATURES: [&str; 11] = [
+pub(super) const FEATURES: [&str; 16] = [
     "alpha_blend",
     "alpha_mask",
+    "anisotropy",
     "clearcoat",
+    "diffuse_transmission",
+    "dispersion",
     "emission",
+    "iridescence",
     "normal_map",
     "occlusion",
     "sheen",
@@ -17,13 +21,18 @@ pub(super) const FEATURES: [&str; 11] = [
     "transmission",
     "unlit",
     "vertex_color",
+    "volume",
 ];
 
 /// Names of the interface that belong to one feature, by what they start with.
-const OWNED: [(&str, &str); 13] = [
+const OWNED: [(&str, &str); 20] = [
     ("alpha_mask", "alpha_cutoff"),
+    ("anisotropy", "anisotropy_"),
     ("clearcoat", "clearcoat_"),
+    ("diffuse_transmission", "diffuse_transmission_"),
+    ("dispersion", "dispersion"),
     ("emission", "emissive_"),
+    ("iridescence", "iridescence_"),
     ("normal_map", "normal_texture"),
     ("normal_map", "normal_scale"),
     ("normal_map", "normal_uv_"),
@@ -34,28 +43,23 @@ const OWNED: [(&str, &str); 13] = [
     ("specular", "specular_factor"),
     ("specular", "specular_color_"),
     ("transmission", "transmission_"),
+    ("volume", "attenuation_color"),
+    ("volume", "attenuation_distance"),
+    ("volume", "thickness_factor"),
 ];
 
+/// Every file of the repository's `shaders/lib`, `shaders/pbr` and `shaders/bake`.
 pub(super) fn shipped() -> Files {
-    macro_rules! files {
-        ($($path:literal),*) => {
-            Files::new(&[$(($path, include_str!(concat!("../../../../", $path)))),*])
-        };
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut files = Files::new(&[]);
+    for folder in ["shaders/lib", "shaders/pbr", "shaders/bake"] {
+        for entry in std::fs::read_dir(root.join(folder)).unwrap() {
+            let path = entry.unwrap().path();
+            let name = format!("{folder}/{}", path.file_name().unwrap().to_str().unwrap());
+            files.0.insert(name, std::fs::read_to_string(path).unwrap().into());
+        }
     }
-    files![
-        "shaders/lib/brdf.wgsl",
-        "shaders/lib/colour.wgsl",
-        "shaders/lib/environment.wgsl",
-        "shaders/lib/frame.wgsl",
-        "shaders/lib/fullscreen.wgsl",
-        "shaders/lib/material.wgsl",
-        "shaders/lib/sheen.wgsl",
-        "shaders/lib/vector.wgsl",
-        "shaders/pbr/background.wgsl",
-        "shaders/pbr/lobes.wgsl",
-        "shaders/pbr/pbr.wgsl",
-        "shaders/pbr/tonemap.wgsl"
-    ]
+    files
 }
 
 #[track_caller]
@@ -119,10 +123,15 @@ fn leftovers_finds_a_symbol_of_an_absent_feature() {
 
 #[test]
 fn each_feature_changes_the_canonical_text() {
-    let plain = material(&[]);
-    for feature in FEATURES {
-        assert_ne!(material(&[feature]).wgsl, plain.wgsl, "{feature} does nothing");
+    let lit: Vec<&str> = FEATURES.iter().copied().filter(|name| *name != "unlit").collect();
+    let all = material(&lit);
+    for feature in &lit {
+        // Beside all others: a volume, for one, does nothing to what lets no light through.
+        let others: Vec<&str> = lit.iter().copied().filter(|name| name != feature).collect();
+        assert_ne!(material(&others).wgsl, all.wgsl, "{feature} does nothing");
     }
+    assert_ne!(material(&["unlit"]).wgsl, material(&[]).wgsl);
+    assert_eq!(material(&["volume"]).wgsl, material(&[]).wgsl, "an opaque thing has no inside");
 }
 
 #[test]
@@ -160,20 +169,36 @@ fn textures_of_all_features_fit_the_default_limit() {
     assert!(samplers.count() <= 16);
 }
 
+/// The first function that a module declares.
+fn first_function(text: &str) -> Option<&str> {
+    let line = text.lines().find_map(|line| line.strip_prefix("fn "))?;
+    line.split('(').next()
+}
+
 #[test]
 fn every_library_function_is_valid() {
-    // Unused functions are validated too, so importing one name of each module checks all of it.
-    let root = "import lib::brdf::{d_charlie, d_ggx, f_schlick, f_schlick_roughness, v_ashikhmin, v_smith_height_correlated};
-        import lib::colour::{from_srgb, luminance, tone_map_aces_fitted};
-        @fragment fn fs_main(@location(0) x: f32) -> @location(0) vec4f {
-            let d = d_ggx(x, x, x) * v_smith_height_correlated(x, x, x) + d_charlie(x, x) * v_ashikhmin(x, x);
-            let f = f_schlick(vec3f(x), 1.0, x) + f_schlick_roughness(vec3f(x), x, x);
-            return vec4f(from_srgb(f) + tone_map_aces_fitted(f), luminance(f) * d);
-        }";
-    let mut files = shipped();
-    files.0.insert("shaders/test/root.wgsl".to_owned(), root.into());
-    let wgsl = compiled(files.compile("shaders/test/root.wgsl", &[])).wgsl;
-    assert!(wgsl.contains("fn d_charlie("));
+    let files = shipped();
+    // A module is joined whole and validated before what is unused goes: one name of each checks all of it.
+    for (path, text) in files.0.iter().filter(|(path, _)| path.starts_with("shaders/lib/")) {
+        let Some(name) = first_function(text) else {
+            assert!(
+                path.ends_with("constants.wgsl") || path.ends_with("frame.wgsl"),
+                "{path} has no function"
+            );
+            continue;
+        };
+        let module = path.trim_start_matches("shaders/lib/").trim_end_matches(".wgsl");
+        let compile = |text: &str| {
+            let root =
+                format!("import lib::{module}::{name};\n@compute @workgroup_size(1) fn main() {{ _ = 1; }}");
+            let mut files = shipped();
+            files.0.insert(path.clone(), text.into());
+            files.0.insert("shaders/test/root.wgsl".to_owned(), root.as_str().into());
+            files.compile("shaders/test/root.wgsl", &[])
+        };
+        compiled(compile(text));
+        assert!(compile(&format!("{text}\nfn wrong() -> f32 {{ return 1u; }}")).compiled.is_none(), "{path}");
+    }
 }
 
 #[test]

@@ -1,0 +1,17 @@
+//! The shader library and the bake passes on the device, beside functions in `f64`, native twins and exact maps.
+//!
+//! `cargo test --release -p kiln-gpu --test library -- --nocapture` prints every error with its tolerance.
+
+mod bakes;
+mod colour;
+mod complete;
+mod cubes;
+mod fragment;
+mod functions;
+mod lobes;
+mod passes;
+mod reference;
+mod samples;
+mod support;
+mod tutorials;
+mod twins;
