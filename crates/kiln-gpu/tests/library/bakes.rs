@@ -12,7 +12,7 @@ use crate::cubes::{
 };
 use crate::passes::{Pass, Setting, sampler};
 use crate::support::{gpu, say};
-use crate::twins::{self, Prefilter, tutorial_basis};
+use crate::twins::{self, ALONG_X, Prefilter, tutorial_basis};
 
 pub const WANTED: &str = "nobody cancels";
 
@@ -309,10 +309,12 @@ fn brdf_table_is_its_twin() {
             (0..size * size).map(error).fold(0.0, f64::max)
         };
         let centre = |index: usize| (index as f64 + 0.5) / size as f64;
-        let twin =
-            worst(&|index| twins::scale_bias(masking, centre(index % size), centre(index / size), 1024));
-        let wrong =
-            worst(&|index| twins::scale_bias(other, centre(index % size), centre(index / size), 1024));
+        let twin = worst(&|index| {
+            twins::scale_bias(masking, centre(index % size), centre(index / size), 1024, ALONG_X)
+        });
+        let wrong = worst(&|index| {
+            twins::scale_bias(other, centre(index % size), centre(index / size), 1024, ALONG_X)
+        });
         let truth = worst(&|index| [exact[2 * index], exact[2 * index + 1]].map(f64::from));
         say(&format!(
             "brdf_table, {masking:?}, 1024 samples: twin {twin:.1e} (tolerance 2e-5, another {wrong:.1e})  truth: worst {truth:.1e}"

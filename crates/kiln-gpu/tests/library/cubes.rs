@@ -143,6 +143,20 @@ pub fn flat_texture(gpu: &Gpu, width: usize, height: usize) -> wgpu::Texture {
     texture(gpu, [width as u32, height as u32, 1], 1)
 }
 
+/// What a fragment stage with two components draws into.
+pub fn pair_texture(gpu: &Gpu, size: usize) -> wgpu::Texture {
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: None,
+        size: wgpu::Extent3d { width: size as u32, height: size as u32, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Rg32Float,
+        usage: wgpu::TextureUsages::COPY_SRC | wgpu::TextureUsages::RENDER_ATTACHMENT,
+        view_formats: &[],
+    })
+}
+
 pub fn cube_texture(gpu: &Gpu, face_size: usize, levels: usize) -> wgpu::Texture {
     texture(gpu, [face_size as u32, face_size as u32, 6], levels)
 }

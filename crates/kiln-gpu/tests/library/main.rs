@@ -8,6 +8,7 @@ mod complete;
 mod cubes;
 mod fragment;
 mod functions;
+mod glsl;
 mod lobes;
 mod passes;
 mod reference;

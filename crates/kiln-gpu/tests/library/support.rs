@@ -46,6 +46,22 @@ pub fn compile(root: &str, root_text: Option<&str>, features: &[&str]) -> Compil
     outcome.compiled.unwrap_or_else(|| panic!("{root} does not compile:\n{}", said.join("\n")))
 }
 
+/// Compiles a GLSL program of `tests/shaders/tutorials`.
+#[track_caller]
+pub fn compile_tutorial(files: &[&str]) -> Compiled {
+    let roots: Vec<String> = files.iter().map(|file| format!("tests/shaders/tutorials/{file}")).collect();
+    let request = kiln_shader::glsl::Request {
+        features: &BTreeSet::new(),
+        defines: &[],
+        include_dirs: &[],
+        prelude: &[],
+    };
+    let mut read = |path: &str| std::fs::read_to_string(repository().join(path)).ok().map(Arc::from);
+    let outcome = kiln_shader::glsl::compile_glsl(&roots, &request, &mut read);
+    let said: Vec<String> = outcome.diagnostics.iter().map(ToString::to_string).collect();
+    outcome.compiled.unwrap_or_else(|| panic!("{files:?} does not compile:\n{}", said.join("\n")))
+}
+
 /// The binding of a shader that has this name.
 #[track_caller]
 pub fn binding<'a>(compiled: &'a Compiled, name: &str) -> &'a Binding {

@@ -1,7 +1,7 @@
 //! The algorithms that tutorials teach: what they are off by, and how the fragment passes that draw them are run.
 //!
-//! `tests/shaders/tutorials` has them in GLSL; the numbers here are those of native twins with the same constants, bases and
-//! offsets, so that each error is the algorithm's.
+//! `tests/shaders/tutorials` has them in GLSL, which `glsl` runs; the numbers here are those of native twins with the same
+//! constants, bases and offsets, so that each error is the algorithm's.
 
 use kiln_bake::{Cancel, Masking};
 use kiln_brdf::{Precision, dfg};
@@ -13,10 +13,10 @@ use crate::cubes::{cube_of, cube_view, difference, flat_texture, read_image, upl
 use crate::fragment::{Program, Scene, screen};
 use crate::passes::{Setting, sampler};
 use crate::support::{compile, gpu, say, unit};
-use crate::twins::{self, Prefilter, Surface, tutorial_basis, z_up_basis};
+use crate::twins::{self, ALONG_Y, Prefilter, Surface, tutorial_basis, z_up_basis};
 
 /// The same sky seen with the tutorials' convention: their centre column looks along +X.
-fn turned(panorama: &Panorama) -> Panorama {
+pub fn turned(panorama: &Panorama) -> Panorama {
     let (width, height) = (panorama.width(), panorama.height());
     let texel = |index: usize| {
         let (x, y) = (index % width, index / width);
@@ -36,12 +36,12 @@ fn report(what: &str, map: &Cube, truth: &Cube, rms_max: f64) {
 }
 
 /// LearnOpenGL's prefilter: 1024 samples.
-fn open_gl(roughness: f64) -> Prefilter {
+pub fn open_gl(roughness: f64) -> Prefilter {
     Prefilter { roughness, count: 1024, bias: 0.0, basis: z_up_basis, offsets: [1e-4, 1e-4] }
 }
 
 /// The Vulkan samples': 32 samples, a level more.
-fn vulkan(roughness: f64) -> Prefilter {
+pub fn vulkan(roughness: f64) -> Prefilter {
     Prefilter { roughness, count: 32, bias: 1.0, basis: z_up_basis, offsets: [1e-4, 0.0] }
 }
 
@@ -80,7 +80,8 @@ fn over_the_table(f: impl Fn(f64, f64) -> f64) -> [f64; 2] {
 
 #[test]
 fn tutorial_table_and_shading_are_off_by_what_is_stated() {
-    let table = |n_dot_v, roughness| twins::scale_bias(Masking::SchlickIbl, n_dot_v, roughness, 1024);
+    let table =
+        |n_dot_v, roughness| twins::scale_bias(Masking::SchlickIbl, n_dot_v, roughness, 1024, ALONG_Y);
     let own = |n_dot_v, roughness| dfg(Masking::SchlickIbl, n_dot_v, roughness, Precision::Table);
     let exact = |n_dot_v, roughness| dfg(Masking::SmithCorrelated, n_dot_v, roughness, Precision::Table);
     // What a dielectric reflects of uniform light.
@@ -122,7 +123,7 @@ fn direction_program(gpu: &Gpu, imports: &str, radiance: &str) -> Program {
     Program::new(gpu, compile("shaders/test/root.wgsl", Some(&root), &[]))
 }
 
-fn empty_scene(gpu: &Gpu) -> Scene<'static> {
+pub fn empty_scene(gpu: &Gpu) -> Scene<'static> {
     Scene { attributes: Vec::new(), textures: Vec::new(), sampler: sampler(gpu, false), values: Vec::new() }
 }
 
@@ -211,19 +212,19 @@ fn fs_main(in: Varying) -> @location(0) vec4f {
     return vec4f(pow(max(tone_map_reinhard(sum), vec3f(1e-6)), vec3f(1.0 / 2.2)), 1.0);
 }";
 
-const LIGHTS: [([f64; 3], [f64; 3]); 4] = [
+pub const LIGHTS: [([f64; 3], [f64; 3]); 4] = [
     ([-1.0, 1.0, 1.5], [9.0, 7.0, 5.0]),
     ([1.0, 1.0, 0.5], [3.0, 3.0, 3.0]),
     ([-1.5, -1.0, 0.75], [0.5, 2.0, 4.0]),
     ([2.0, -1.0, 3.0], [30.0, 30.0, 30.0]),
 ];
 
-fn padded([x, y, z]: [f64; 3]) -> [f32; 4] {
+pub fn padded([x, y, z]: [f64; 3]) -> [f32; 4] {
     [x as f32, y as f32, z as f32, 0.0]
 }
 
 /// The table of the tutorials, exact.
-fn tutorial_table() -> Vec<f32> {
+pub fn tutorial_table() -> Vec<f32> {
     let kind = kiln_bake::Table::GgxScaleBias(Masking::SchlickIbl);
     let values = kiln_bake::table(kind, kiln_bake::TableAxes::Uniform, 32, Cancel::NEVER).expect(WANTED);
     values.chunks_exact(2).flat_map(|entry| [entry[0], entry[1], 0.0]).collect()

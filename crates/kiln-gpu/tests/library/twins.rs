@@ -251,14 +251,25 @@ pub fn prefilter(source: &Levels, normal: [f64; 3], how: &Prefilter) -> Rgb {
     sum.map(|value| value / total)
 }
 
-/// [scale, bias] of the split sum.
-pub fn scale_bias(masking: Masking, n_dot_v: f64, roughness: f64, count: u32) -> [f64; 2] {
+/// Where the view lies in Kiln's frame of samples.
+pub const ALONG_X: [f64; 2] = [1.0, 0.0];
+/// … and in the tutorials': around the normal (0, 0, 1) they take (0, -1, 0) for tangent.
+pub const ALONG_Y: [f64; 2] = [0.0, 1.0];
+
+/// [scale, bias] of the split sum. The view lies at `azimuth` of the samples' frame, as cosine and sine.
+pub fn scale_bias(
+    masking: Masking,
+    n_dot_v: f64,
+    roughness: f64,
+    count: u32,
+    [cos_v, sin_v]: [f64; 2],
+) -> [f64; 2] {
     let alpha = roughness * roughness;
     let sine = ((1.0 - n_dot_v) * (1.0 + n_dot_v)).sqrt();
     let mut sum = [0.0; 2];
     for i in 0..count {
-        let [x, _, z] = sampling::sample_ggx(sampling::hammersley(i, count), alpha);
-        let v_dot_h = (sine * x + n_dot_v * z).clamp(0.0, 1.0);
+        let [x, y, z] = sampling::sample_ggx(sampling::hammersley(i, count), alpha);
+        let v_dot_h = (sine * (x * cos_v + y * sin_v) + n_dot_v * z).clamp(0.0, 1.0);
         let n_dot_l = 2.0 * v_dot_h * z - n_dot_v;
         if n_dot_l > 0.0 {
             let weight = 4.0 * masking.scattered(alpha, n_dot_v, n_dot_l) * v_dot_h / z;
