@@ -50,14 +50,9 @@ pub fn compile(root: &str, root_text: Option<&str>, features: &[&str]) -> Compil
 #[track_caller]
 pub fn compile_tutorial(files: &[&str]) -> Compiled {
     let roots: Vec<String> = files.iter().map(|file| format!("tests/shaders/tutorials/{file}")).collect();
-    let request = kiln_shader::glsl::Request {
-        features: &BTreeSet::new(),
-        defines: &[],
-        include_dirs: &[],
-        prelude: &[],
-    };
+    let program = kiln_shader::Program { roots, ..Default::default() };
     let mut read = |path: &str| std::fs::read_to_string(repository().join(path)).ok().map(Arc::from);
-    let outcome = kiln_shader::glsl::compile_glsl(&roots, &request, &mut read);
+    let outcome = kiln_shader::compile(&program, &BTreeSet::new(), &mut read);
     let said: Vec<String> = outcome.diagnostics.iter().map(ToString::to_string).collect();
     outcome.compiled.unwrap_or_else(|| panic!("{files:?} does not compile:\n{}", said.join("\n")))
 }
