@@ -11,6 +11,7 @@ mod diagnostics;
 mod glsl;
 mod glsl_hostile;
 mod hostile;
+mod names;
 mod shaders;
 
 /// A project in memory.

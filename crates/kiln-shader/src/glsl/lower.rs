@@ -11,6 +11,7 @@ use super::check;
 use super::declare::{self, Block, Function, Item, Variable};
 use super::lex::{Kind, Token};
 use super::locations::{self, Interface, Passed};
+use super::padding;
 use super::rewrite::{Meaning, Member, Rewriter, Scene, Stored};
 use super::source::{Mapped, Place, Sources};
 use super::switch;
@@ -43,6 +44,7 @@ pub fn lower(
         members: BTreeMap::new(),
         samplers: BTreeSet::new(),
         runtime: BTreeSet::new(),
+        padded: padding::padded_structs(stage),
         prologue: Mapped::default(),
         epilogue: Mapped::default(),
     };
@@ -73,6 +75,8 @@ struct Writer<'a, 's, 'r> {
     samplers: BTreeSet<String>,
     /// Constants whose value only a running shader can compute.
     runtime: BTreeSet<Rc<str>>,
+    /// Structs that need one member more.
+    padded: BTreeSet<Rc<str>>,
     /// What is done before the author's `main`.
     prologue: Mapped,
     /// What is done after it.
@@ -209,6 +213,9 @@ impl Writer<'_, '_, '_> {
                     let (ty, array) = (member.ty.clone(), declare::reversed(&member.array));
                     put(&mut self.types, &[vec![ty, member.name.clone()], array].concat());
                     self.types.push(";\n", member.name.place);
+                }
+                if self.padded.contains(&structure.name.text) {
+                    self.types.push(padding::MEMBER, structure.name.place);
                 }
                 self.types.push("};\n", structure.name.place);
             }

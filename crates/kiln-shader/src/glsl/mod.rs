@@ -38,6 +38,7 @@ mod locations;
 mod lower;
 mod macros;
 mod nesting;
+mod padding;
 mod preprocess;
 mod rewrite;
 mod source;
