@@ -17,7 +17,7 @@ pub fn padded_structs(stage: &Parsed) -> BTreeSet<Rc<str>> {
     for item in &stage.items {
         match item {
             Item::Variable(variable) if variable.qualifiers.is("uniform") => {
-                collect(stage, variable, &mut found)
+                collect(stage, variable, &mut found);
             }
             Item::Block(block) if block.qualifiers.is("uniform") => {
                 block.members.iter().for_each(|member| collect(stage, member, &mut found));
