@@ -13,6 +13,7 @@ mod glsl;
 mod glsl_hostile;
 mod hostile;
 mod imports;
+mod names;
 mod parameters;
 mod shaders;
 

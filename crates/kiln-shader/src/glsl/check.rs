@@ -170,6 +170,15 @@ pub fn buffer_access(block: &Block) -> &'static str {
     if says(&block.qualifiers) || all { "readonly" } else { "" }
 }
 
+/// Checks that an image says its format: WGSL wants it for all.
+pub fn image_format(sources: &mut Sources<'_, '_>, variable: &Variable) {
+    let has_format = variable.qualifiers.layout.iter().any(|layout| is_format(&layout.name.text));
+    if variable.ty.text.contains("image") && !has_format {
+        let message = format!("the image `{}` has no format", variable.name.text);
+        report(sources, variable.place(), message, "write it in the layout, as in `layout(rgba8)`");
+    }
+}
+
 /// How an image is accessed: as declared, else by what is done with it.
 pub fn image_access(sources: &mut Sources<'_, '_>, stage: &Parsed, variable: &Variable) -> &'static str {
     let is_image = variable.ty.text.contains("image");

@@ -77,8 +77,14 @@ pub fn of_program(
         diagnostic.notes = finding.notes;
         return diagnostic;
     };
+    let is_layout = finding.message.contains("align") || finding.message.contains("stride");
     let mut diagnostic = sources.error(*place, finding.message);
-    diagnostic.notes.splice(0..0, finding.notes);
+    let notes = finding.notes.into_iter().filter(|note| !note.starts_with("global variable"));
+    diagnostic.notes.splice(0..0, notes);
+    if is_layout {
+        let help = "structs in uniforms start at multiples of 16 bytes: give the struct a `vec4`, or do not call its constructor";
+        diagnostic.help = Some(help.to_owned());
+    }
     diagnostic
 }
 

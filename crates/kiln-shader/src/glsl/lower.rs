@@ -11,6 +11,8 @@ use super::check;
 use super::declare::{self, Block, Function, Item, Variable};
 use super::lex::{Kind, Token};
 use super::locations::{self, Interface, Passed};
+use super::order;
+use super::padding;
 use super::rewrite::{Meaning, Member, Rewriter, Scene, Stored};
 use super::source::{Mapped, Place, Sources};
 use super::switch;
@@ -43,6 +45,7 @@ pub fn lower(
         members: BTreeMap::new(),
         samplers: BTreeSet::new(),
         runtime: BTreeSet::new(),
+        padded: padding::padded_structs(stage),
         prologue: Mapped::default(),
         epilogue: Mapped::default(),
     };
@@ -51,10 +54,8 @@ pub fn lower(
     }
     writer.holders(holders);
     writer.interface(interface);
-    for item in &stage.items {
-        if let Item::Function(function) = item {
-            writer.function(function);
-        }
+    for function in order::ordered(writer.sources, &stage.items) {
+        writer.function(function);
     }
     writer.finish()
 }
@@ -73,6 +74,8 @@ struct Writer<'a, 's, 'r> {
     samplers: BTreeSet<String>,
     /// Constants whose value only a running shader can compute.
     runtime: BTreeSet<Rc<str>>,
+    /// Structs that need one member more.
+    padded: BTreeSet<Rc<str>>,
     /// What is done before the author's `main`.
     prologue: Mapped,
     /// What is done after it.
@@ -88,6 +91,7 @@ fn scene(stage: &Parsed) -> Scene {
         functions: BTreeSet::new(),
         textured: BTreeSet::new(),
         polyfills: BTreeMap::new(),
+        unsized_members: BTreeSet::new(),
     };
     for name in ["gl_VertexID", "gl_VertexIndex", "gl_InstanceID", "gl_InstanceIndex"] {
         let texts = builtin::variable(name).unwrap_or_default().iter().map(|text| (*text).to_owned());
@@ -113,7 +117,14 @@ fn scene(stage: &Parsed) -> Scene {
                     scene.meanings.insert(name, Meaning::Stored(stored));
                 }
             }
-            Item::Block(block) => block_meanings(&mut scene, stage, block),
+            Item::Block(block) => {
+                block_meanings(&mut scene, stage, block);
+                let members = block
+                    .members
+                    .iter()
+                    .filter(|member| member.array.windows(2).any(|pair| pair[0].is("[") && pair[1].is("]")));
+                scene.unsized_members.extend(members.map(|member| Rc::clone(&member.name.text)));
+            }
             Item::Qualifiers(qualifiers, _) => {
                 for (axis, name) in ["local_size_x", "local_size_y", "local_size_z"].iter().enumerate() {
                     size[axis] = qualifiers.integer(name).unwrap_or(size[axis]);
@@ -209,6 +220,9 @@ impl Writer<'_, '_, '_> {
                     let (ty, array) = (member.ty.clone(), declare::reversed(&member.array));
                     put(&mut self.types, &[vec![ty, member.name.clone()], array].concat());
                     self.types.push(";\n", member.name.place);
+                }
+                if self.padded.contains(&structure.name.text) {
+                    self.types.push(padding::MEMBER, structure.name.place);
                 }
                 self.types.push("};\n", structure.name.place);
             }
@@ -369,6 +383,7 @@ impl Writer<'_, '_, '_> {
         let Some(combined) = builtin::combined(&variable.ty.text) else {
             let format = variable.qualifiers.layout.iter().find(|layout| check::is_format(&layout.name.text));
             let format = format.map_or(String::new(), |format| format!("{}, ", format.name.text));
+            check::image_format(self.sources, variable);
             let access = check::image_access(self.sources, self.stage, variable);
             self.globals.push(&format!("layout({format}{layout}) {access} uniform "), place);
             put(&mut self.globals, &[variable.ty.clone(), variable.name.clone()]);
@@ -500,7 +515,6 @@ impl Writer<'_, '_, '_> {
         result.iter().for_each(|token| check::type_name(self.sources, token));
         let returned = result.last().map(|token| Rc::clone(&token.text));
         let mut rewriter = Rewriter::new(self.sources, &mut self.scene, returned);
-        rewriter.function = Some(Rc::clone(&function.name.text));
         let parameters: Vec<Vec<Token>> =
             function.parameters.iter().map(|parameter| rewriter.parameter(parameter)).collect();
         let body = function.body.as_ref().map(|body| switch::without_fall_through(rewriter.sources, body));

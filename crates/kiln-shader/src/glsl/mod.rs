@@ -38,6 +38,8 @@ mod locations;
 mod lower;
 mod macros;
 mod nesting;
+mod order;
+mod padding;
 mod preprocess;
 mod rewrite;
 mod source;

@@ -57,6 +57,8 @@ pub struct Scene {
     pub functions: BTreeSet<Rc<str>>,
     /// Those that take a combined texture.
     pub textured: BTreeSet<Rc<str>>,
+    /// Members of buffers that are arrays without a length.
+    pub unsized_members: BTreeSet<Rc<str>>,
     /// Functions to define, with the place of their first use.
     pub polyfills: BTreeMap<&'static str, Place>,
 }
@@ -85,8 +87,6 @@ pub struct Rewriter<'a, 's, 'r> {
     /// Text in place of a token.
     instead: BTreeMap<usize, Vec<Token>>,
     result: Option<Rc<str>>,
-    /// The function that is rewritten.
-    pub function: Option<Rc<str>>,
     out: Vec<Token>,
 }
 
@@ -115,7 +115,6 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
             before: BTreeMap::new(),
             instead: BTreeMap::new(),
             result,
-            function: None,
             out: Vec::new(),
         }
     }
@@ -236,6 +235,14 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
         let is_call = tokens.get(at + 1).is_some_and(|next| next.is("("));
         let text = &*token.text;
         if after_dot {
+            let array = at.checked_sub(2).map(|array| &tokens[array]);
+            if text == "length"
+                && is_call
+                && let Some(array) = array.filter(|array| self.scene.unsized_members.contains(&array.text))
+            {
+                let message = format!("the length of the buffer array `{}` is not supported", array.text);
+                self.report(array.place.to(token.place), message, "pass the count in a uniform");
+            }
             self.out.push(token.clone());
             return;
         }
@@ -260,13 +267,6 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
             self.reverse(tokens, at + 1);
         } else if self.local(text).is_none() && self.scene.functions.contains(text) && is_call {
             // The author's function hides what GLSL has of the same name.
-            if self.function.as_deref() == Some(text) {
-                self.report(
-                    token.place,
-                    format!("`{text}` calls itself"),
-                    "shaders have no recursion: use a loop",
-                );
-            }
         } else if self.rewritten(tokens, at, is_call) {
             return;
         }
@@ -380,7 +380,20 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
 
     fn instance(&mut self, tokens: &[Token], at: usize, members: &BTreeMap<String, Member>) -> bool {
         let [_, dot, member, ..] = &tokens[at..] else { return false };
-        let Some(found) = members.get(&*member.text).filter(|_| dot.is(".")) else { return false };
+        if !dot.is(".") {
+            return false;
+        }
+        let Some(found) = members.get(&*member.text) else {
+            let is_passed = members.values().any(|member| matches!(member, Member::Renamed(_)));
+            if is_passed {
+                let close = crate::suggest::closest(&member.text, members.keys().map(String::as_str));
+                let help = close.map_or("see the block's declaration".to_owned(), |name| {
+                    format!("did you mean `{name}`?")
+                });
+                self.report(member.place, format!("no member `{}`", member.text), help);
+            }
+            return false;
+        };
         match found {
             Member::Renamed(name) => {
                 let mut token = member.clone();
