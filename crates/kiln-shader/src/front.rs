@@ -5,6 +5,7 @@ use naga::valid::{Capabilities, ModuleInfo, ValidationError, ValidationFlags, Va
 use naga::{Module, WithSpan};
 
 use crate::explain::Finding;
+use crate::lint::{self, Warning};
 use crate::{Compiled, canonical, describe, interface, limits};
 
 /// Stack of the thread that naga runs on. Its front end, validator and writer recurse over expressions and
@@ -36,12 +37,12 @@ pub enum Fault {
     Internal(String),
 }
 
-/// Parses, validates, compacts, emits and reflects.
-pub fn compile_linked(text: &str) -> Result<Compiled, Fault> {
+/// Parses, validates, compacts, emits and reflects; with `lints`, also says what is doubtful.
+pub fn compile_linked(text: &str, lints: bool) -> Result<(Compiled, Vec<Warning>), Fault> {
     if text.len() > limits::LINKED_BYTES_MAX {
         return Err(Fault::TooLong { limit: limits::LINKED_BYTES_MAX, actual: text.len() });
     }
-    on_deep_stack(Fault::Internal, || run(text))
+    on_deep_stack(Fault::Internal, || run(text, lints))
 }
 
 /// Runs `work` with a stack that naga's recursion fits in. A panic in it becomes the error `internal`.
@@ -63,7 +64,7 @@ fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
     text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "panic".to_owned())
 }
 
-fn run(text: &str) -> Result<Compiled, Fault> {
+fn run(text: &str, lints: bool) -> Result<(Compiled, Vec<Warning>), Fault> {
     let mut module =
         naga::front::wgsl::parse_str(text).map_err(|error| Fault::Source(parse_finding(&error)))?;
     validate(&module).map_err(|error| Fault::Source(validation_finding(&module, &error)))?;
@@ -75,7 +76,8 @@ fn run(text: &str) -> Result<Compiled, Fault> {
     let wgsl = canonical::emit(&module, &info).map_err(Fault::Internal)?;
     let reparsed = naga::front::wgsl::parse_str(&wgsl).map_err(|error| reparse_fault(&error, &wgsl))?;
     let reflection = interface::reflect(&module, &info, &reparsed).map_err(Fault::Internal)?;
-    Ok(Compiled { wgsl, reflection })
+    let warnings = if lints { lint::check(&module, &info) } else { Vec::new() };
+    Ok((Compiled { wgsl, reflection }, warnings))
 }
 
 fn reparse_fault(error: &ParseError, wgsl: &str) -> Fault {

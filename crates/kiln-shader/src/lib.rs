@@ -27,6 +27,7 @@ mod interface;
 mod join;
 mod limits;
 mod link;
+mod lint;
 mod module;
 mod reflect;
 mod resolve;
@@ -73,15 +74,36 @@ pub struct Outcome {
 /// Compiles the module `root` for a set of features. `read` gets paths relative to the project and is asked
 /// at most once for each.
 pub fn compile(root: &str, features: &BTreeSet<String>, read: &mut Read<'_>) -> Outcome {
+    compile_module(root, features, read, false)
+}
+
+/// Does what [`compile`] does, and warns of what is valid but doubtful: arguments at the edge of a function's
+/// domain, derivatives in control flow that is not uniform, and what is slow for no reason. A warning stands at
+/// its author's file and line, as an error does, and is no error: there is a shader all the same.
+///
+/// `// kiln: allow(domain) why`, with the name of the lint that a warning ends with, on its line or the line
+/// above allows it.
+pub fn lint(root: &str, features: &BTreeSet<String>, read: &mut Read<'_>) -> Outcome {
+    compile_module(root, features, read, true)
+}
+
+fn compile_module(root: &str, features: &BTreeSet<String>, read: &mut Read<'_>, lints: bool) -> Outcome {
     let graph = link::Graph::load(root, condition::Mode::Features(features), read);
-    let result = if kiln_diagnostic::has_errors(&graph.diagnostics) {
-        Err(Vec::new())
-    } else {
+    let (mut compiled, mut found) = (None, Vec::new());
+    if !kiln_diagnostic::has_errors(&graph.diagnostics) {
         let linked = join::Linked::join(&graph);
-        front::compile_linked(&linked.text).map_err(|fault| vec![explain::diagnostic(&graph, &linked, fault)])
-    };
+        match front::compile_linked(&linked.text, lints) {
+            Ok((shader, warnings)) => {
+                compiled = Some(shader);
+                if lints {
+                    found = explain::warnings(&graph, &linked, warnings);
+                }
+            }
+            Err(fault) => found.push(explain::diagnostic(&graph, &linked, fault)),
+        }
+    }
     let link::Graph { dependencies, features, mut diagnostics, .. } = graph;
-    let compiled = result.map_err(|mut found| diagnostics.append(&mut found)).ok();
+    diagnostics.append(&mut found);
     Outcome { compiled, diagnostics, dependencies, features }
 }
 

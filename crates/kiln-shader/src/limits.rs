@@ -16,6 +16,9 @@ pub const NESTING_MAX: usize = 100;
 /// those that are open. naga recurses over expressions, so this bounds its stack.
 pub const EXPRESSION_DEPTH_MAX: usize = 500;
 
+/// Most warnings for one shader: nobody reads more.
+pub const WARNINGS_MAX: usize = 100;
+
 /// Checks that brackets pair up and that nothing is nested deeper than the limits.
 pub fn check_nesting(file: &str, text: &str, tokens: &[Token]) -> Result<(), Box<Diagnostic>> {
     let mut open: Vec<Level> = Vec::new();

@@ -10,6 +10,8 @@ mod conditions;
 mod diagnostics;
 mod emit;
 mod hostile;
+mod lint;
+mod ranges;
 mod shaders;
 
 /// A project in memory.
