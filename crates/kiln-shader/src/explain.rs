@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use kiln_diagnostic::{Diagnostic, Span};
+use kiln_diagnostic::{Diagnostic, Severity, Span};
 
 use crate::front::{self, Fault};
 use crate::join::Linked;
 use crate::link::Graph;
-use crate::suggest;
+use crate::lint::{Allowances, Warning};
 use crate::token::{self, Kind};
+use crate::{limits, suggest};
 
 /// Explains `fault` of the linked text, and what else is wrong: the first fault of every module, since naga stops at its
 /// first.
@@ -51,7 +52,33 @@ fn diagnostic(graph: &Graph, linked: &Linked, fault: Fault) -> Diagnostic {
     }
 }
 
-/// What naga found wrong with the linked text.
+/// The lint's warnings of the linked text, without what its author allows.
+pub fn warnings(graph: &Graph, linked: &Linked, warnings: Vec<Warning>) -> Vec<Diagnostic> {
+    let root = graph.modules.first().map_or("", |module| module.path.as_str());
+    let finder = Finder { graph, linked, root };
+    let mut diagnostics = Vec::new();
+    let allowances = Allowances::read(graph, &mut diagnostics);
+    for Warning { rule, finding, help } in warnings {
+        if diagnostics.len() >= limits::WARNINGS_MAX {
+            let message = format!("only the first {} warnings are shown", limits::WARNINGS_MAX);
+            diagnostics.push(Diagnostic::warning(message).in_file(root));
+            break;
+        }
+        let main = finding.labels.first().map(|(range, _)| range.clone());
+        let origin = main.and_then(|range| linked.origin(range));
+        let mut diagnostic = finder.diagnostic(finding);
+        let line = diagnostic.span.as_ref().map_or(0, |span| span.line);
+        if origin.is_some_and(|(module, _)| allowances.allow(module, line, rule)) {
+            continue;
+        }
+        diagnostic.severity = Severity::Warning;
+        diagnostic.help = Some(format!("{help}; or say `// kiln: allow({}) why`", rule.name()));
+        diagnostics.push(diagnostic);
+    }
+    diagnostics
+}
+
+/// What naga or the lint found in the linked text.
 #[derive(Debug)]
 pub struct Finding {
     /// What is wrong.

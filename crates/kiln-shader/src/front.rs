@@ -5,6 +5,7 @@ use naga::valid::{Capabilities, ModuleInfo, ValidationError, ValidationFlags, Va
 use naga::{Module, WithSpan};
 
 use crate::explain::Finding;
+use crate::lint::{self, Warning};
 use crate::source_map::{self, LinkedFunction};
 use crate::{Compiled, canonical, describe, interface, limits};
 
@@ -44,12 +45,14 @@ pub struct LinkedShader {
     pub compiled: Compiled,
     /// Where its functions stand in the linked text.
     pub functions: Vec<LinkedFunction>,
+    /// What is doubtful, if that was asked for.
+    pub warnings: Vec<Warning>,
 }
 
-/// Parses, validates, compacts, emits and reflects.
-pub fn compile_linked(text: &str) -> Result<LinkedShader, Fault> {
+/// Parses, validates, compacts, emits and reflects; with `lints`, also says what is doubtful.
+pub fn compile_linked(text: &str, lints: bool) -> Result<LinkedShader, Fault> {
     check_length(text)?;
-    on_deep_stack(Fault::Internal, || compile(text))
+    on_deep_stack(Fault::Internal, || compile(text, lints))
 }
 
 /// Parses and validates only; a text without entry points is fine.
@@ -100,7 +103,7 @@ fn parse(text: &str) -> Result<Module, Fault> {
     Ok(module)
 }
 
-fn compile(text: &str) -> Result<LinkedShader, Fault> {
+fn compile(text: &str, lints: bool) -> Result<LinkedShader, Fault> {
     let mut module = parse(text)?;
     if module.entry_points.is_empty() {
         return Err(Fault::NoEntryPoint);
@@ -111,7 +114,8 @@ fn compile(text: &str) -> Result<LinkedShader, Fault> {
     let reparsed = naga::front::wgsl::parse_str(&wgsl).map_err(|error| reparse_fault(&error, &wgsl))?;
     let reflection = interface::reflect(&module, &info, &reparsed).map_err(Fault::Internal)?;
     let functions = source_map::functions(&module, &reparsed);
-    Ok(LinkedShader { compiled: Compiled { wgsl, reflection }, functions })
+    let warnings = if lints { lint::check(&module, &info) } else { Vec::new() };
+    Ok(LinkedShader { compiled: Compiled { wgsl, reflection }, functions, warnings })
 }
 
 fn reparse_fault(error: &ParseError, wgsl: &str) -> Fault {

@@ -16,6 +16,9 @@ pub const NESTING_MAX: usize = 100;
 /// those that are open. naga recurses over expressions, so this bounds its stack.
 pub const EXPRESSION_DEPTH_MAX: usize = 500;
 
+/// Most warnings for one shader: nobody reads more.
+pub const WARNINGS_MAX: usize = 100;
+
 /// What breaks a limit, or a bracket without its partner.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Fault {

@@ -13,8 +13,10 @@ mod glsl;
 mod glsl_hostile;
 mod hostile;
 mod imports;
+mod lint;
 mod names;
 mod parameters;
+mod ranges;
 mod shaders;
 
 /// A project in memory.

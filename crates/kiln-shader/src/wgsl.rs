@@ -10,8 +10,8 @@ use crate::join::Linked;
 use crate::link::{Graph, Read};
 use crate::{Outcome, Scan, explain, front, parameter, source_map};
 
-/// Compiles the root module `root`.
-pub fn compile(root: &str, features: &BTreeSet<String>, read: &mut Read<'_>) -> Outcome {
+/// Compiles the root module `root`; with `lints`, also warns of what is doubtful.
+pub fn compile(root: &str, features: &BTreeSet<String>, lints: bool, read: &mut Read<'_>) -> Outcome {
     let mut graph = Graph::load(root, Mode::Features(features), read);
     let mut outcome = Outcome {
         diagnostics: std::mem::take(&mut graph.diagnostics),
@@ -23,8 +23,11 @@ pub fn compile(root: &str, features: &BTreeSet<String>, read: &mut Read<'_>) -> 
         return outcome;
     }
     let linked = Linked::join(&graph, &graph.order);
-    match front::compile_linked(&linked.text) {
+    match front::compile_linked(&linked.text, lints) {
         Ok(shader) => {
+            if lints {
+                outcome.diagnostics.extend(explain::warnings(&graph, &linked, shader.warnings));
+            }
             outcome.source_map = source_map::place(shader.functions, &graph, &linked);
             let annotations = annotations(&graph, &mut outcome.diagnostics);
             let mut compiled = shader.compiled;

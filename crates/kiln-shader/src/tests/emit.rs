@@ -352,7 +352,7 @@ fn deepest_allowed_shaders_are_written() {
 }
 
 /// WGSL's functions, as expressions of a scalar `x: f32`, integers `i: i32` and `u: u32`, and textures.
-const EXPRESSIONS: &[&str] = &[
+pub(super) const EXPRESSIONS: &[&str] = &[
     "abs(x)",
     "acos(x)",
     "acosh(x)",
@@ -490,7 +490,7 @@ const RESOURCES: &str = "
     @group(0) @binding(15) var tu: texture_2d<u32>;";
 
 /// A shader that adds up `expressions`.
-fn sum(expressions: &[&str]) -> String {
+pub(super) fn sum(expressions: &[&str]) -> String {
     let terms: String = expressions.iter().map(|expression| format!("sum += {expression};")).collect();
     canonical(&format!(
         "{RESOURCES} @fragment fn fs(@location(0) x: f32, @location(1) @interpolate(flat, either) i: i32, @location(2) @interpolate(flat, either) u: u32) -> @location(0) vec4f {{ var sum = 0.0; {terms} return vec4f(sum); }}"
