@@ -1,6 +1,6 @@
 //! Groups and bindings of everything that is filled from outside, the same for all stages.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use super::Parsed;
 use super::builtin;
@@ -90,8 +90,7 @@ pub fn assign(sources: &mut Sources<'_, '_>, stages: &[Parsed]) -> Bindings {
         }
         // Without a set, binding numbers are OpenGL's: each kind of resource counts from 0 there.
         let fixed = fixed.filter(|at| !taken.contains_key(at));
-        let used: BTreeSet<u32> = taken.keys().filter(|at| at.0 == group).map(|at| at.1).collect();
-        let free = (0..=u32::MAX).find(|binding| !used.contains(binding)).unwrap_or(0);
+        let free = (0..=u32::MAX).find(|binding| !taken.contains_key(&(group, *binding))).unwrap_or(0);
         let at = fixed.unwrap_or((group, free));
         taken.insert(at, name.clone());
         bindings.places.insert(name.clone(), place);

@@ -1,5 +1,7 @@
 //! What a declaration may not say, because WGSL or naga has nothing for it.
 
+use std::collections::BTreeSet;
+
 use super::Parsed;
 use super::builtin;
 use super::declare::{Block, DROPPED, Item, Qualifiers, Struct, Variable};
@@ -119,7 +121,7 @@ pub fn uniform_type(sources: &mut Sources<'_, '_>, stage: &Parsed, variable: &Va
         let message = format!("`{}` is an array of arrays", variable.name.text);
         report(sources, variable.place(), message, "use one array, and compute the index");
     }
-    members_of(sources, stage, &variable.ty, 0);
+    members_of(sources, stage, &variable.ty);
 }
 
 fn structure<'a>(stage: &'a Parsed, name: &Token) -> Option<&'a Struct> {
@@ -129,19 +131,23 @@ fn structure<'a>(stage: &'a Parsed, name: &Token) -> Option<&'a Struct> {
     })
 }
 
-/// Members of a struct that is stored in a uniform.
-fn members_of(sources: &mut Sources<'_, '_>, stage: &Parsed, ty: &Token, depth: usize) {
-    let Some(structure) = structure(stage, ty).filter(|_| depth < 8) else { return };
-    for member in &structure.members {
-        let (name, ty) = (&member.name.text, &*member.ty.text);
-        if ty == "bool" || ty.starts_with("bvec") {
-            let message = format!("`{name}` is `{ty}`, inside of a struct that is a uniform");
-            report(sources, member.place(), message, "use `int` and compare it with 0");
-        } else if !member.array.is_empty() && is_narrow(ty) {
-            let message = format!("`{name}` is an array of `{ty}`, inside of a struct that is a uniform");
-            report(sources, member.place(), message, "use an array of `vec4`");
+/// Members of a struct that is stored in a uniform, and of those in it.
+fn members_of(sources: &mut Sources<'_, '_>, stage: &Parsed, ty: &Token) {
+    let mut todo = vec![ty];
+    let mut seen = BTreeSet::new();
+    while let Some(ty) = todo.pop() {
+        let Some(structure) = structure(stage, ty).filter(|_| seen.insert(&ty.text)) else { continue };
+        for member in &structure.members {
+            let (name, ty) = (&member.name.text, &*member.ty.text);
+            if ty == "bool" || ty.starts_with("bvec") {
+                let message = format!("`{name}` is `{ty}`, inside of a struct that is a uniform");
+                report(sources, member.place(), message, "use `int` and compare it with 0");
+            } else if !member.array.is_empty() && is_narrow(ty) {
+                let message = format!("`{name}` is an array of `{ty}`, inside of a struct that is a uniform");
+                report(sources, member.place(), message, "use an array of `vec4`");
+            }
+            todo.push(&member.ty);
         }
-        members_of(sources, stage, &member.ty, depth + 1);
     }
 }
 

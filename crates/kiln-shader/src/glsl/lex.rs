@@ -39,6 +39,8 @@ pub struct Hidden {
     pub name: Rc<str>,
     /// More of them.
     pub rest: Option<Rc<Hidden>>,
+    /// How many there are.
+    pub count: usize,
 }
 
 impl Token {

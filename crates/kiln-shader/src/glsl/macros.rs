@@ -11,6 +11,9 @@ pub const EXPANDED_TOKENS_MAX: usize = 1 << 19;
 /// Deepest nesting of macro calls in arguments of macro calls.
 const ARGUMENT_DEPTH_MAX: usize = 64;
 
+/// Longest chain of macros that stand for each other.
+const REPLACED_DEPTH_MAX: usize = 256;
+
 /// A definition.
 #[derive(Clone, Debug)]
 pub struct Macro {
@@ -128,7 +131,13 @@ impl Macros {
             let message = format!("macro calls nest at most {ARGUMENT_DEPTH_MAX} deep");
             return Err(Fault { message, place: name.place });
         }
-        let hidden = Rc::new(Hidden { name: Rc::clone(&name.text), rest: name.hidden.clone() });
+        self.spend(definition.body.len(), name.place)?;
+        let count = name.hidden.as_ref().map_or(0, |hidden| hidden.count) + 1;
+        if count > REPLACED_DEPTH_MAX {
+            let message = format!("macros stand for macros more than {REPLACED_DEPTH_MAX} deep");
+            return Err(Fault { message, place: name.place });
+        }
+        let hidden = Rc::new(Hidden { name: Rc::clone(&name.text), rest: name.hidden.clone(), count });
         let parameters = definition.parameters.as_deref().unwrap_or_default();
         let body = &definition.body;
         let mut out: Vec<Token> = Vec::new();

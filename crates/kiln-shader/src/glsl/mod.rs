@@ -89,7 +89,7 @@ pub fn compile(program: &Program, features: &BTreeSet<String>, read: &mut Read<'
     let Sources { dependencies, diagnostics: found, .. } = sources;
     // What several stages include is wrong once.
     let mut diagnostics: Vec<Diagnostic> = Vec::new();
-    for diagnostic in found {
+    for diagnostic in found.into_iter().take(source::DIAGNOSTICS_MAX) {
         if !diagnostics.contains(&diagnostic) {
             diagnostics.push(diagnostic);
         }
@@ -159,7 +159,10 @@ fn load(
         }
         let tokens = preprocessed.tokens;
         if nesting::check_characters(sources, &tokens) && nesting::check_nesting(sources, &tokens) {
-            stages.push(Parsed::new(stage, root, tokens));
+            let parsed = Parsed::new(stage, root, tokens);
+            if nesting::check_count(sources, &parsed) {
+                stages.push(parsed);
+            }
         }
     }
     if program.roots.is_empty() {

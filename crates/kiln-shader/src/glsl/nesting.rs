@@ -1,11 +1,33 @@
 //! Limits on the shape of a stage: naga recurses over what is nested.
 
+use super::Parsed;
+use super::declare::Item;
 use super::lex::{self, Kind, Token};
 use super::lower::put;
 use super::source::{Mapped, Sources};
 
 /// Most statements inside of each other without braces, as in an `else if` chain.
 const STATEMENTS_MAX: usize = 200;
+
+/// Most structs, blocks, uniforms, inputs and outputs of a stage. Devices offer a tenth of it.
+const DECLARATIONS_MAX: usize = 1024;
+
+/// Whether the stage declares no more than any device could fill.
+pub fn check_count(sources: &mut Sources<'_, '_>, stage: &Parsed) -> bool {
+    let places = stage.items.iter().filter_map(|item| match item {
+        Item::Struct(structure) => Some(structure.name.place),
+        Item::Block(block) => Some(block.name.place),
+        Item::Variable(variable) if !variable.qualifiers.is("const") => {
+            variable.qualifiers.storage.as_ref().map(|storage| storage.place)
+        }
+        _ => None,
+    });
+    let Some(place) = places.into_iter().nth(DECLARATIONS_MAX) else { return true };
+    let message = format!("more than {DECLARATIONS_MAX} structs, blocks, uniforms, inputs and outputs");
+    let fault = sources.error(place, message);
+    sources.diagnostics.push(fault);
+    false
+}
 
 /// Whether brackets pair up and nothing is nested too deep for naga.
 pub fn check_nesting(sources: &mut Sources<'_, '_>, tokens: &[Token]) -> bool {

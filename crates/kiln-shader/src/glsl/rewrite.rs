@@ -552,7 +552,9 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
             _ => None,
         };
         let Some(value) = value else { return };
-        let open = (value..tokens.len()).find(|at| tokens[*at].is("(") || tokens[*at].is("{"));
+        let open = (value..tokens.len())
+            .take_while(|at| !tokens[*at].is(";"))
+            .find(|at| tokens[*at].is("(") || tokens[*at].is("{"));
         let elements = open.and_then(|open| Some(&tokens[open + 1..lex::closing(tokens, open)?]));
         let is_list = tokens.get(value).is_some_and(|first| first.is("(") || first.is("{"))
             || tokens.get(value + 1).is_some_and(|next| next.is("["));

@@ -9,6 +9,9 @@ use kiln_diagnostic::{Diagnostic, Severity, Span};
 use crate::link::Read;
 use crate::{Dependency, limits};
 
+/// Most diagnostics of a program; nobody reads more.
+pub const DIAGNOSTICS_MAX: usize = 200;
+
 /// Bytes of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Place {
@@ -100,6 +103,10 @@ impl<'a, 'r> Sources<'a, 'r> {
 
     fn diagnostic(&self, severity: Severity, place: Place, message: impl Into<String>) -> Diagnostic {
         let file = &self.files[place.file];
+        if self.diagnostics.len() >= DIAGNOSTICS_MAX {
+            // It will be dropped: finding its line would only take time.
+            return Diagnostic::new(severity, message).in_file(&file.path);
+        }
         let mut diagnostic =
             Diagnostic::new(severity, message).at(&file.path, &file.text, place.start..place.end);
         diagnostic.notes = self.chain(place.file);

@@ -4,7 +4,7 @@ use super::lex::{self, Kind, Token};
 use super::source::Sources;
 
 /// Most tokens that the copies of one function may have.
-const COPIED_TOKENS_MAX: usize = 1 << 14;
+const COPIED_TOKENS_MAX: usize = 1 << 12;
 
 /// Rewrites all `switch` statements of a body whose brackets pair up, the inner ones first.
 pub fn without_fall_through(sources: &mut Sources<'_, '_>, body: &[Token]) -> Vec<Token> {
@@ -80,7 +80,7 @@ fn written(cases: &[Case]) -> Vec<Token> {
             }
         }
         let place = case.labels.last().map(|label| label.place);
-        if let Some(place) = place.filter(|_| last.is_none()) {
+        if let Some(place) = place.filter(|_| last.is_none() && fallen.len() > 1) {
             out.extend(
                 [(Kind::Word, "break"), (Kind::Mark, ";")].map(|(kind, text)| Token::new(kind, text, place)),
             );

@@ -60,6 +60,32 @@ fn deepest_allowed_input_ends_in_a_result() {
     }
 }
 
+/// Large input of each kind whose work could grow faster than the input: about half a mebibyte.
+#[test]
+fn large_input_takes_time_in_proportion() {
+    let texts = [
+        "uniform sampler2D a;\n".repeat(20_000),
+        (0..20_000).map(|index| format!("uniform sampler2D a{index};\n")).collect(),
+        (0..20_000).map(|index| format!("in vec4 a{index}; out vec4 b{index};\n")).collect(),
+        main_with(&"double x; ".repeat(40_000)),
+        main_with(&"switch (1) { case 0: x = 1.0; case 1: x = 2.0; } ".repeat(8_000)),
+        main_with(&"x = a[]; ".repeat(40_000)),
+        (0..20_000).map(|index| format!("#define A{index} A{} x\n", index + 1)).collect::<String>()
+            + "float y = A0;",
+        format!("#define E(p) {}\n{}", "p ".repeat(200_000), "E() ".repeat(40_000)),
+        (0..2_000)
+            .map(|index| format!("struct S{} {{ {} }};\n", index + 1, format!("S{index} a; ").repeat(20)))
+            .collect(),
+        (0..20_000).map(|index| format!("float f{index}() {{ return f{}(); }}\n", index + 1)).collect(),
+        "#if 1\n".repeat(80_000),
+    ];
+    for (index, text) in texts.iter().enumerate() {
+        let outcome = Case::of(&[("a.frag", &format!("{HEAD}{text}"))]).compile();
+        assert!(outcome.compiled.is_none(), "text {index} compiles");
+        assert!(outcome.diagnostics.len() <= 200);
+    }
+}
+
 #[test]
 fn endless_and_repeated_includes_are_refused() {
     let deep: Vec<(String, String)> = (0..100)
