@@ -12,6 +12,6 @@ fn charlie_albedo(n_dot_v: f32, perceptual_roughness: f32) -> f32 {
     let c0 = 0.297 + r * (2.005 - 0.618 * r);
     let c1 = 3.770 + r * (4.466 * r - 3.683) - 0.175 / r;
     let c2 = 5.856 - r * (6.785 + 3.852 * r) + 2.949 / r;
-    // The polynomial is at least 0.49 for all inputs in range.
+    // kiln: allow(domain) the polynomial is at least 0.49 for all inputs in range
     return min(peak / (c0 + n_dot_v * (c1 + n_dot_v * c2)), 1.0);
 }

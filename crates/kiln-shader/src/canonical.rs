@@ -10,8 +10,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use naga::back::wgsl::WriterFlags;
 use naga::compact::{KeepUnused, compact};
+use naga::proc::{Alignment, Layouter};
 use naga::valid::ModuleInfo;
-use naga::{Expression, Module, TypeInner, UniqueArena};
+use naga::{Expression, Module, StructMember, TypeInner, UniqueArena};
 
 use crate::token::{self, Kind, Token};
 
@@ -48,7 +49,7 @@ fn unused_constants(module: &Module) -> Vec<naga::Handle<naga::Constant>> {
 /// Emits a valid module.
 pub fn emit(module: &Module, info: &ModuleInfo) -> Result<String, String> {
     let mut module = module.clone();
-    let kept = replace_names(&mut module);
+    let kept = replace_names(&mut module)?;
     number_locals(&mut module);
     let text = naga::back::wgsl::write_string(&module, info, WriterFlags::empty())
         .map_err(|error| format!("cannot write canonical WGSL: {error}"))?;
@@ -56,17 +57,37 @@ pub fn emit(module: &Module, info: &ModuleInfo) -> Result<String, String> {
 }
 
 /// Placeholders with the names they stand for.
+#[derive(Default)]
 struct Kept {
     prefix: String,
     names: BTreeMap<String, String>,
     /// Those of `names` that a local could hide; members have a scope of their own.
     globals: BTreeSet<String>,
+    /// Bytes that members take with the space behind them, where that is more than their type's size: naga's writer forgets
+    /// `@align` and `@size`, which lay a block out as its author's program fills it.
+    sizes: BTreeMap<String, u32>,
 }
 
 impl Kept {
     fn hide_member(&mut self, name: &mut String) {
         let placeholder = format!("{}{}", self.prefix, letters(self.names.len()));
         self.names.insert(placeholder.clone(), std::mem::replace(name, placeholder));
+    }
+
+    /// Hides the names of a struct's members, and notes which are followed by more space than WGSL puts there by itself.
+    fn hide_members(&mut self, layouter: &Layouter, members: &mut [StructMember], span: u32) {
+        let ends: Vec<u32> = members.iter().skip(1).map(|member| member.offset).chain([span]).collect();
+        let alignments = members.iter().skip(1).map(|member| layouter[member.ty].alignment);
+        let widest = members.iter().map(|member| layouter[member.ty].alignment).max();
+        let alignments: Vec<Alignment> = alignments.chain(widest).collect();
+        for ((member, end), alignment) in members.iter_mut().zip(ends).zip(alignments) {
+            let natural = alignment.round_up(member.offset + layouter[member.ty].size);
+            let Some(name) = member.name.as_mut().filter(|name| is_legal(name)) else { continue };
+            self.hide_member(name);
+            if end > natural {
+                self.sizes.insert(name.clone(), end - member.offset);
+            }
+        }
     }
 
     /// Replaces `name` by a new placeholder, unless it is a name of WGSL's own that the text may need.
@@ -101,16 +122,17 @@ fn letters(mut number: usize) -> String {
     }
 }
 
-fn replace_names(module: &mut Module) -> Kept {
-    let mut kept = Kept { prefix: unused_prefix(module), names: BTreeMap::new(), globals: BTreeSet::new() };
+fn replace_names(module: &mut Module) -> Result<Kept, String> {
+    let mut layouter = Layouter::default();
+    layouter.update(module.to_ctx()).map_err(|error| format!("a type without layout: {error}"))?;
+    let mut kept = Kept { prefix: unused_prefix(module), ..Kept::default() };
     let mut types = UniqueArena::new();
     for (handle, ty) in module.types.iter() {
         let mut ty = ty.clone();
-        if let TypeInner::Struct { members, .. } = &mut ty.inner {
-            // Members of predeclared structs, as `modf` returns, are WGSL's own.
-            let predeclared = ty.name.as_ref().is_some_and(|name| name.starts_with("__"));
-            let names = members.iter_mut().filter_map(|member| member.name.as_mut());
-            names.filter(|name| !predeclared && is_legal(name)).for_each(|name| kept.hide_member(name));
+        // Members of predeclared structs, as `modf` returns, are WGSL's own.
+        let predeclared = ty.name.as_ref().is_some_and(|name| name.starts_with("__"));
+        if let (TypeInner::Struct { members, span }, false) = (&mut ty.inner, predeclared) {
+            kept.hide_members(&layouter, members, *span);
         }
         types.insert(ty, module.types.get_span(handle));
     }
@@ -124,7 +146,7 @@ fn replace_names(module: &mut Module) -> Kept {
     for entry in &mut module.entry_points {
         kept.hide_global(&mut entry.name);
     }
-    kept
+    Ok(kept)
 }
 
 /// Names arguments, variables and values by what they are; naga's writer numbers equal names of a function.
@@ -175,6 +197,11 @@ fn restore_names(text: &str, kept: &Kept) -> Result<String, String> {
         });
         if let Some(name) = name {
             restored.push_str(&text[at..token.start]);
+            // Only a declaration has a colon behind its member.
+            let is_declared = tokens.get(index + 1).is_some_and(|next| next.is(':'));
+            if let Some(size) = kept.sizes.get(word).filter(|_| is_declared) {
+                restored.push_str(&format!("@size({size}) "));
+            }
             restored.push_str(name);
             at = token.end;
         }

@@ -56,7 +56,7 @@ pub const FRAME_MEMBERS: [&str; 13] = [
 ];
 
 /// Members of the uniform `material`, besides `X_uv_u` and `X_uv_v`.
-pub const MATERIAL_MEMBERS: [&str; 16] = [
+pub const MATERIAL_MEMBERS: [&str; 27] = [
     "base_color_factor",
     "metallic_factor",
     "roughness_factor",
@@ -73,6 +73,17 @@ pub const MATERIAL_MEMBERS: [&str; 16] = [
     "sheen_color_factor",
     "sheen_roughness_factor",
     "transmission_factor",
+    "anisotropy_strength",
+    "anisotropy_rotation",
+    "iridescence_factor",
+    "iridescence_ior",
+    "iridescence_thickness_maximum",
+    "thickness_factor",
+    "attenuation_distance",
+    "attenuation_color",
+    "dispersion",
+    "diffuse_transmission_factor",
+    "diffuse_transmission_color_factor",
 ];
 
 /// Members of the uniform `draw`.

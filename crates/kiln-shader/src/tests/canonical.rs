@@ -155,6 +155,41 @@ fn reflected_offsets_follow_wgsl_layout() {
     assert_eq!(*size_bytes, 80);
 }
 
+/// naga's writer drops `@align` and `@size`, and a host that fills the block as the author laid it out would miss.
+#[test]
+fn layout_that_the_author_chose_is_kept_in_the_text() {
+    const SHADER: &str = "
+        struct Inner { @size(24) a: vec2f, @size(8) b: f32 }
+        struct Block {
+            a: f32,
+            @align(16) b: f32,
+            @size(24) c: vec2f,
+            d: vec3f,
+            @align(32) e: Inner,
+            list: array<Inner, 2>,
+            @size(64) last: f32,
+        }
+        @group(0) @binding(0) var<uniform> block: Block;
+        @fragment fn fs_main() -> @location(0) vec4f {
+            return vec4f(block.a + block.b + block.c.x + block.e.b, block.d) * block.last * block.list[1].b;
+        }";
+    let layout = |shader: &str| -> (u32, Vec<(String, u32)>) {
+        let reflection = compile_one(shader).reflection;
+        let BindingKind::Uniform { size_bytes, members } = &reflection.bindings[0].kind else {
+            panic!("a uniform: {:?}", reflection.bindings[0])
+        };
+        (*size_bytes, members.iter().map(|member| (member.name.clone(), member.offset_bytes)).collect())
+    };
+    let (size, members) = layout(SHADER);
+    let offsets: Vec<u32> = members.iter().map(|(_, offset)| *offset).collect();
+    assert_eq!(offsets, [0, 16, 24, 48, 64, 96, 160]);
+    // What a pipeline is made of has the same layout as what was reflected of the author's text.
+    let text = compile_one(SHADER).wgsl;
+    assert_eq!(layout(&text), (size, members));
+    assert_ne!(layout(&text.replace("@size(16) a", "a")).1[1].1, 16, "the check sees a lost attribute");
+    assert_eq!(text.matches("@size").count(), 4, "only where WGSL would do otherwise:\n{text}");
+}
+
 #[test]
 fn storage_textures_and_depth_are_reflected() {
     let reflection = compile_one(
