@@ -48,7 +48,24 @@ pub fn warm_up() {
 /// # Errors
 /// The child died of it.
 pub fn compile(program: &Program, features: &BTreeSet<String>, sources: Sources) -> Result<Outcome, Died> {
-    let task = Task::Compile { program: program.clone(), features: features.clone(), sources };
+    compile_with(program, features, sources, false)
+}
+
+/// [`kiln_shader::lint`], likewise.
+///
+/// # Errors
+/// The child died of it.
+pub fn lint(program: &Program, features: &BTreeSet<String>, sources: Sources) -> Result<Outcome, Died> {
+    compile_with(program, features, sources, true)
+}
+
+fn compile_with(
+    program: &Program,
+    features: &BTreeSet<String>,
+    sources: Sources,
+    lints: bool,
+) -> Result<Outcome, Died> {
+    let task = Task::Compile { program: program.clone(), features: features.clone(), sources, lints };
     match run(&task)? {
         Reply::Compiled(outcome) => Ok(outcome),
         Reply::Emitted(_) => Err(other_answer()),

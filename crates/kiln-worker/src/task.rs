@@ -29,6 +29,8 @@ pub enum Task {
         features: BTreeSet<String>,
         /// All it may import.
         sources: Sources,
+        /// Whether to warn of what is doubtful: [`kiln_shader::lint`].
+        lints: bool,
     },
     /// [`kiln_shader::emit`].
     Emit {
@@ -52,8 +54,9 @@ impl Task {
     /// Does the work here and now.
     pub fn perform(&self) -> Reply {
         match self {
-            Task::Compile { program, features, sources } => {
-                Reply::Compiled(kiln_shader::compile(program, features, &mut |path| sources.read(path)))
+            Task::Compile { program, features, sources, lints } => {
+                let compile = if *lints { kiln_shader::lint } else { kiln_shader::compile };
+                Reply::Compiled(compile(program, features, &mut |path| sources.read(path)))
             }
             Task::Emit { wgsl, language } => {
                 Reply::Emitted(kiln_shader::emit(wgsl, *language).map_err(|error| error.diagnostic()))
