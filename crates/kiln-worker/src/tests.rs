@@ -1,5 +1,6 @@
 //! Children that misbehave. What sound ones do is tested with the real program (`tests/e2e/shaders.rs`).
 
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use crate::{Died, Limits, Sources, Task, Workers};
@@ -7,12 +8,8 @@ use crate::{Died, Limits, Sources, Task, Workers};
 const SHORT: Limits = Limits { cpu: Duration::from_millis(200), wall: Duration::from_secs(60) };
 
 fn task() -> Task {
-    let sources = Sources::default();
-    Task::Compile {
-        program: kiln_shader::Program::of("a.wgsl"),
-        features: std::collections::BTreeSet::new(),
-        sources,
-    }
+    let program = kiln_shader::Program::of("a.wgsl");
+    Task::Compile { program, features: BTreeSet::new(), sources: Sources::default(), lints: false }
 }
 
 #[cfg(unix)]

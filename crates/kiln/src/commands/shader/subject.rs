@@ -50,12 +50,30 @@ pub(super) fn subjects(args: &SubjectArgs) -> anyhow::Result<(Vec<Subject>, Vec<
         let file = path.canonicalize().ok().filter(|file| file.is_file());
         let file =
             file.ok_or_else(|| WrongInput(format!("{} is no file that can be read", path.display())))?;
+        if !is_shader(&file) {
+            let message = format!(
+                "{} is no shader: their names end in .wgsl .vert .frag .comp or .glsl",
+                path.display()
+            );
+            return Err(WrongInput(message).into());
+        }
         programs.entry(program_of(&file)).or_default().push(file);
     }
     for (_, files) in programs {
         subjects.push(of_files(files, args, &variants)?);
     }
+    // A module that another of these imports is checked where it is used, under that one's features.
+    let imported: BTreeSet<PathBuf> = subjects.iter().flat_map(Subject::imported).collect();
+    subjects.retain(|subject| !imported.contains(&subject.base.join(subject.program.subject())));
     Ok((subjects, diagnostics))
+}
+
+/// Ends of the names of shader files.
+const EXTENSIONS: [&str; 8] = ["wgsl", "vert", "frag", "comp", "glsl", "geom", "tesc", "tese"];
+
+fn is_shader(file: &Path) -> bool {
+    let extension = file.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    EXTENSIONS.contains(&&*extension)
 }
 
 /// Stages of one GLSL program differ in what follows the first dot; a WGSL file is a program of its own.
@@ -146,6 +164,13 @@ impl Subject {
         let features = kiln_shader::scan(&program, &mut read).features;
         let asked = if asked.is_empty() { usual_variants(&features) } else { asked };
         Subject { name, base, program, features, asked, sources }
+    }
+
+    /// The files it is made of besides its roots.
+    fn imported(&self) -> impl Iterator<Item = PathBuf> {
+        let present = self.sources.0.iter().filter(|(_, text)| text.is_some());
+        let others = present.filter(|(path, _)| !self.program.roots.contains(path));
+        others.map(|(path, _)| self.base.join(path))
     }
 
     /// Compiles every variant once.
