@@ -171,6 +171,19 @@ impl Watch {
         Viewer(Client::connect(self.socket.clone(), name))
     }
 
+    /// The processes that it started.
+    pub fn worker_ids(&self) -> Vec<u32> {
+        let parent = self.process.0.id();
+        let of_entry = |entry: std::io::Result<std::fs::DirEntry>| -> Option<u32> {
+            let id: u32 = entry.ok()?.file_name().to_str()?.parse().ok()?;
+            let stat = std::fs::read_to_string(format!("/proc/{id}/stat")).ok()?;
+            // `man 5 proc`: the name in parentheses, the state, the parent.
+            let found: u32 = stat.rsplit_once(')')?.1.split_ascii_whitespace().nth(1)?.parse().ok()?;
+            (found == parent).then_some(id)
+        };
+        std::fs::read_dir("/proc").unwrap().filter_map(of_entry).collect()
+    }
+
     /// Kills the daemon as a crash would.
     pub fn kill(mut self) {
         self.process.0.kill().unwrap();

@@ -106,8 +106,11 @@ impl Workers {
         let idle = self.idle().pop();
         if let Some(worker) = idle {
             match self.run_on(worker, task) {
-                // It may have died before, of something else: killed by a person, or by a system short of memory.
-                Err(Died::Crashed(_)) => {}
+                // It may have died before, of something else: killed by a person, or by a system short of memory. So may
+                // the others.
+                Err(Died::Crashed(_)) => {
+                    self.idle().retain_mut(|worker| matches!(worker.child.try_wait(), Ok(None)));
+                }
                 result => return result,
             }
         }

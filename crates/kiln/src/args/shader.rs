@@ -53,6 +53,10 @@ pub(crate) struct CheckArgs {
     /// Warnings count as errors
     #[arg(long)]
     pub(crate) deny_warnings: bool,
+    /// Leave out warnings of what is valid but doubtful: arguments at the edge of a function's domain, derivatives in
+    /// control flow that is not uniform, what is slow for no reason (WGSL only)
+    #[arg(long)]
+    pub(crate) no_lint: bool,
     /// Print JSON instead of text
     #[arg(long)]
     pub(crate) json: bool,

@@ -30,6 +30,8 @@ pub(crate) fn run(args: &WatchArgs) -> anyhow::Result<ExitCode> {
         daemon => daemon.context("starting to watch")?,
     };
     stop_on_signals(daemon.stop_handle())?;
+    // The first edit does not wait for a process to start.
+    kiln_worker::warm_up();
     if args.build.json {
         say!("{}", json!({"event": "listening", "socket": daemon.socket()}));
         daemon.run(&mut |notice| say!("{}", to_json(&notice)));

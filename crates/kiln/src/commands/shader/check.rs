@@ -17,7 +17,7 @@ pub(super) fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     let mut shaders: Vec<Value> = Vec::new();
     let (mut good, mut all) = (0, 0);
     for subject in &subjects {
-        let mut variants = subject.compile()?;
+        let mut variants = if args.no_lint { subject.compile()? } else { subject.lint()? };
         for variant in variants.iter_mut().filter(|variant| variant.outcome.is_library) {
             // A module for others to import is checked all the same.
             variant.outcome.diagnostics.retain(|diagnostic| !diagnostic.is_error());

@@ -8,7 +8,7 @@ use anyhow::Context as _;
 use kiln_diagnostic::Diagnostic;
 use kiln_project::{PROJECT_FILE, Project, variant_name};
 use kiln_shader::{Outcome, Program};
-use kiln_worker::Sources;
+use kiln_worker::{Died, Sources};
 
 use crate::args::SubjectArgs;
 use crate::place::{self, WrongInput};
@@ -175,16 +175,28 @@ impl Subject {
 
     /// Compiles every variant once.
     pub(super) fn compile(&self) -> anyhow::Result<Vec<Variant>> {
+        self.compile_by(kiln_worker::compile)
+    }
+
+    /// Compiles every variant once, with warnings of what is doubtful.
+    pub(super) fn lint(&self) -> anyhow::Result<Vec<Variant>> {
+        self.compile_by(kiln_worker::lint)
+    }
+
+    fn compile_by(
+        &self,
+        compile: fn(&Program, &BTreeSet<String>, Sources) -> Result<Outcome, Died>,
+    ) -> anyhow::Result<Vec<Variant>> {
         let mut variants: BTreeMap<BTreeSet<String>, Vec<String>> = BTreeMap::new();
         for asked in &self.asked {
             // Features that no condition names make no difference.
             let effective = asked.intersection(&self.features).cloned().collect();
             variants.entry(effective).or_default().push(variant_name(asked));
         }
-        let compile = |(features, names): (BTreeSet<String>, Vec<String>)| {
-            let outcome = match kiln_worker::compile(&self.program, &features, self.sources.clone()) {
+        let one = |(features, names): (BTreeSet<String>, Vec<String>)| {
+            let outcome = match compile(&self.program, &features, self.sources.clone()) {
                 Ok(outcome) => outcome,
-                Err(kiln_worker::Died::NoWorker(reason)) => anyhow::bail!("no shader compiler: {reason}"),
+                Err(Died::NoWorker(reason)) => anyhow::bail!("no shader compiler: {reason}"),
                 Err(died) => {
                     let diagnostics = vec![died.diagnostic(self.program.subject())];
                     Outcome { diagnostics, ..Outcome::default() }
@@ -192,7 +204,7 @@ impl Subject {
             };
             Ok(Variant { names, outcome })
         };
-        variants.into_iter().map(compile).collect()
+        variants.into_iter().map(one).collect()
     }
 
     /// What is asked for without being known.
