@@ -25,7 +25,7 @@ fn visibility(n_dot_l: f32, n_dot_v: f32, alpha: f32) -> f32 {
 
 // Means of 4 V (n·l) (v·h) / (n·h), split by Schlick's weight (1 - v·h)⁵.
 fn scale_bias(n_dot_v: f32, perceptual_roughness: f32) -> vec2f {
-    let alpha = perceptual_roughness * perceptual_roughness;
+    let alpha = clamp(perceptual_roughness * perceptual_roughness, 1e-6, 1.0);
     let view = vec3f(sqrt(saturate((1.0 - n_dot_v) * (1.0 + n_dot_v))), 0.0, n_dot_v);
     let count = max(settings.sample_count, 1u);
     var sum = vec2f(0.0);

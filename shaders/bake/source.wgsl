@@ -17,5 +17,6 @@ fn filter_level(pdf: f32, count: u32, bias: f32) -> f32 {
     let texel_sr = 4.0 * PI / (6.0 * size * size);
     // Where no sample falls the density is 0, and so is what it stands for.
     let sample_sr = 1.0 / max(f32(count) * pdf, 1e-12);
+    // kiln: allow(domain) the density has an end: no sample stands for less than 1e-12 of a texel
     return max(0.5 * log2(sample_sr / texel_sr) + bias, 0.0);
 }

@@ -22,6 +22,7 @@ fn hammersley(index: u32, count: u32) -> vec2f {
 // listing 3: the divisor is at least 1 in size, at the poles too.
 fn orthonormal_basis(normal: vec3f) -> mat3x3f {
     let s = select(-1.0, 1.0, normal.z >= 0.0);
+    // kiln: allow(domain) s has the sign of normal.z, so the sum is at least 1 in size
     let a = -1.0 / (s + normal.z);
     let b = normal.x * normal.y * a;
     let tangent = vec3f(1.0 + s * normal.x * normal.x * a, s * b, -s * normal.x);

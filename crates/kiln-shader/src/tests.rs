@@ -6,14 +6,14 @@ use std::sync::Arc;
 use crate::{Compiled, Outcome, Program, compile};
 
 mod canonical;
+mod cases;
 mod conditions;
 mod diagnostics;
 mod emit;
-mod glsl;
-mod glsl_hostile;
 mod hostile;
 mod imports;
 mod lint;
+mod mutations;
 mod names;
 mod parameters;
 mod ranges;

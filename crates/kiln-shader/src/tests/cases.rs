@@ -1,5 +1,5 @@
-//! GLSL programs of `tests/shaders/glsl`, one folder each, against what stands in their `expected.txt`:
-//! diagnostics as the user sees them, or the interface and the canonical WGSL.
+//! Programs of `tests/shaders/glsl` and `tests/shaders/wgsl`, one folder each, against what stands in their `expected.txt`:
+//! diagnostics as the user sees them, warnings of the lint among them, or the interface and the canonical WGSL.
 //!
 //! `KILN_UPDATE_SNAPSHOTS=1` writes the files anew.
 
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::glsl::is_glsl;
-use crate::{BindingKind, Outcome, Program, Reflection, compile, scan};
+use crate::{BindingKind, Outcome, Program, Reflection, lint, scan};
 
 /// What a case is compiled with: the file `request.txt` has a word and its value on each line.
 #[derive(Clone, Debug, Default)]
@@ -46,7 +46,8 @@ impl Case {
             }
         }
         if case.roots.is_empty() {
-            let top = case.files.keys().filter(|path| is_glsl(path) && !path.contains('/'));
+            let is_root = |path: &str| is_glsl(path) || path == "main.wgsl";
+            let top = case.files.keys().filter(|path| is_root(path) && !path.contains('/'));
             case.roots = top.filter(|path| !path.ends_with(".inc.glsl")).cloned().collect();
         }
         case
@@ -59,7 +60,7 @@ impl Case {
 
     pub fn compile(&self) -> Outcome {
         let mut asked = BTreeSet::new();
-        compile(&self.program(), &self.features, &mut |path| {
+        lint(&self.program(), &self.features, &mut |path| {
             assert!(asked.insert(path.to_owned()), "{path} is read twice");
             self.files.get(path).cloned()
         })
@@ -70,8 +71,11 @@ impl Case {
     }
 }
 
-pub fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/shaders/glsl")
+/// Folders of cases.
+const LANGUAGES: [&str; 2] = ["glsl", "wgsl"];
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/shaders")
 }
 
 /// All files below `folder`, by their path relative to it.
@@ -87,14 +91,18 @@ fn files_in(folder: &Path, prefix: &str, files: &mut BTreeMap<String, Arc<str>>)
     }
 }
 
+/// All cases, by name, as `glsl/arrays`.
 pub fn cases() -> BTreeMap<String, Case> {
     let mut cases = BTreeMap::new();
-    for entry in folder().read_dir().unwrap() {
-        let path = entry.unwrap().path();
-        let mut files = BTreeMap::new();
-        files_in(&path, "", &mut files);
-        files.remove("expected.txt");
-        cases.insert(path.file_name().unwrap().to_string_lossy().into_owned(), Case::new(files));
+    for language in LANGUAGES {
+        for entry in folder().join(language).read_dir().unwrap() {
+            let path = entry.unwrap().path();
+            let mut files = BTreeMap::new();
+            files_in(&path, "", &mut files);
+            files.remove("expected.txt");
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            cases.insert(format!("{language}/{name}"), Case::new(files));
+        }
     }
     cases
 }
@@ -136,6 +144,16 @@ fn interface(text: &mut String, reflection: &Reflection) {
             let _ = writeln!(text, "    {} {}: {}", member.offset_bytes, member.name, member.ty);
         }
     }
+    for constant in &reflection.overrides {
+        let _ = writeln!(text, "override {}: {} = {:?}", constant.name, constant.ty, constant.default);
+    }
+    for parameter in &reflection.parameters {
+        let _ = writeln!(
+            text,
+            "parameter {}: {:?} from {:?}",
+            parameter.name, parameter.widget, parameter.default
+        );
+    }
 }
 
 /// Why `actual` is not what `path` holds; writes it there instead if `update` says so.
@@ -167,7 +185,7 @@ fn programs_match_their_snapshots() {
 
 #[test]
 fn snapshot_check_sees_another_text_and_a_missing_file() {
-    let path = folder().join("tutorial_330/expected.txt");
+    let path = folder().join("glsl/tutorial_330/expected.txt");
     let expected = std::fs::read_to_string(&path).unwrap();
     assert_eq!(mismatch(&path, &expected, false), None);
     assert!(mismatch(&path, &expected.replacen('1', "2", 1), false).is_some());

@@ -1,9 +1,9 @@
-//! GLSL nobody should write: limits give errors, mutations neither panic nor hang.
+//! Programs nobody should write: limits give errors, mutations neither panic nor hang.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::glsl::{Case, cases, summary};
+use super::cases::{Case, cases, summary};
 use super::rendered;
 
 const HEAD: &str = "#version 450\nlayout(location = 0) out vec4 colour;\n";

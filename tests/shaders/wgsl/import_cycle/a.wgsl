@@ -1,0 +1,2 @@
+import b::g;
+fn f() -> f32 { return g(); }

@@ -1,0 +1,2 @@
+import a::f;
+fn g() -> f32 { return f(); }

@@ -1,0 +1,2 @@
+import a::f;
+@fragment fn fs_main() -> @location(0) vec4f { return vec4f(f()); }

@@ -1,0 +1,2 @@
+fn used() -> f32 { return 1.0; }
+fn not_used() -> f32 { return 2.0; }
