@@ -154,8 +154,72 @@ fn listed_variants_that_cannot_differ_are_compiled_once() {
     for variant in ["base", "sheen", "clearcoat+sheen", "nonsense"] {
         assert!(project.path(&format!("baked/shader/tonemap/{variant}.wgsl")).is_file(), "{variant}");
     }
+    let counts = &report["shader_variants"];
+    let [asked, compiled] = ["asked", "compiled"].map(|key| counts[key].as_u64().unwrap());
+    assert_eq!(asked - compiled, 3, "{counts}");
     let warnings = report["diagnostics"].to_string();
     assert!(warnings.contains("no condition names `nonsense`"), "{warnings}");
+}
+
+/// A tonemap that shows its own texture.
+const TEXTURED: &str = "@group(3) @binding(0) var grade: texture_2d<f32>;
+@group(3) @binding(1) var any_sampler: sampler;
+@vertex fn vs_main(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
+    return vec4f(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0, 0.0, 1.0);
+}
+@fragment fn fs_main() -> @location(0) vec4f {
+    return textureSampleLevel(grade, any_sampler, vec2f(1.25, 0.5), 0.0);
+}
+";
+
+#[cfg(feature = "preview")]
+#[test]
+fn texture_of_the_author_is_bound_by_name_and_followed() {
+    let project = Project::sample();
+    project.write("shaders/pbr/tonemap.wgsl", TEXTURED);
+    let own = |text: &str| format!("[shader.tonemap]\ntextures = [\"{text}\"]\n");
+    project.edit("kiln.toml", "[shader.tonemap]\n", &own("grade=grade.png"));
+    let watch = project.watch();
+    let missing = watch.published()["diagnostics"].to_string();
+    assert!(
+        missing.contains("the texture's file was not found") && missing.contains("grade.png"),
+        "{missing}"
+    );
+    // The left half is what (1.25, 0.5) repeats into.
+    let picture = |left: [u8; 4]| {
+        let texel = |x, _| image::Rgba(if x < 8 { left } else { [9, 9, 9, 255] });
+        let mut file = std::io::Cursor::new(Vec::new());
+        image::RgbaImage::from_fn(16, 4, texel).write_to(&mut file, image::ImageFormat::Png).unwrap();
+        file.into_inner()
+    };
+    let pixel = |name: &str| {
+        let out = project.beside(name);
+        let mut command = project.command(&["preview", "DIR", "--headless", "--size", "16x8", "--out"]);
+        let output = command.arg(&out).output().unwrap();
+        let said = text(&output.stderr);
+        if said.contains("mesa-vulkan-drivers") {
+            crate::harness::skip("a texture of the author's", "there is no graphics device");
+            return None;
+        }
+        assert!(output.status.success() && !said.contains("error"), "{said}");
+        Some(image::open(out.join("frame_0001.png")).unwrap().to_rgb8().get_pixel(8, 4).0)
+    };
+    project.write("grade.png", picture([188, 64, 0, 255]));
+    assert_eq!(ran(&watch.published()), ["check texture grade.png"]);
+    let Some(linear) = pixel("linear") else { return };
+    assert_eq!(linear, [188, 64, 0]);
+    project.write("grade.png", picture([20, 64, 255, 255]));
+    assert_eq!(ran(&watch.published()), ["check texture grade.png"]);
+    assert_eq!(pixel("edited"), Some([20, 64, 255]));
+    project.edit("kiln.toml", "grade.png", "grade.png srgb");
+    watch.published();
+    let colour = pixel("colour").unwrap();
+    assert!(colour[1] < 16 && colour[2] == 255, "read as colours: {colour:?}");
+    project.edit("kiln.toml", "grade=", "other=");
+    watch.published();
+    let mut command = project.command(&["preview", "DIR", "--headless", "--size", "16x8", "--out"]);
+    let said = text(&command.arg(project.beside("none")).output().unwrap().stderr);
+    assert!(said.contains("declares the texture `grade`, which nobody gives"), "{said}");
 }
 
 #[test]

@@ -10,11 +10,11 @@ use crate::scene_gpu::GpuScene;
 use crate::slot::Slot;
 use crate::uniform::{FrameValues, fill_block, material_member};
 
-/// What all draws of one program share: group 0 with the buffer that each frame writes, and the author's parameters.
+/// What all draws of one program share: group 0 with the buffer that each frame writes, and what the author added.
 #[derive(Debug)]
 pub(crate) struct FrameBinding {
     group: Option<wgpu::BindGroup>,
-    parameters: Option<wgpu::BindGroup>,
+    own: Option<wgpu::BindGroup>,
     block: Option<(wgpu::Buffer, Bound)>,
 }
 
@@ -44,12 +44,12 @@ impl FrameBinding {
             view.map(wgpu::BindingResource::TextureView)
         };
         let group = create_group(gpu, program, 0, resource);
-        FrameBinding { group, parameters: program.parameter_group.clone(), block }
+        FrameBinding { group, own: program.own_group.clone(), block }
     }
 
     /// Sets groups 0 and 3.
     pub fn set(&self, pass: &mut wgpu::RenderPass<'_>) {
-        for (index, group) in [(0, &self.group), (3, &self.parameters)] {
+        for (index, group) in [(0, &self.group), (3, &self.own)] {
             if let Some(group) = group {
                 pass.set_bind_group(index, group, &[]);
             }

@@ -33,6 +33,7 @@ mod keeper;
 mod live_picture;
 mod mip;
 mod neutral;
+mod own;
 mod panel;
 mod prepare;
 mod program;

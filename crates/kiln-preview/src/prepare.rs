@@ -13,6 +13,7 @@ use crate::binding::FrameBinding;
 use crate::draw_list::DrawList;
 use crate::keeper::{Keeper, Key};
 use crate::neutral;
+use crate::own::OwnTextures;
 use crate::program::{Program, Raster};
 use crate::report::{ApplyReport, choose, describe};
 use crate::scene_gpu::GpuScene;
@@ -62,7 +63,8 @@ impl Preparer {
     pub fn new(gpu: &Gpu) -> Self {
         let (tonemap, _) = gpu.catch_errors(|| {
             let (wgsl, reflection) = (neutral::TONEMAP_WGSL, neutral::tonemap_reflection());
-            Program::new(&gpu.device, "built-in tonemap", Role::Tonemap, wgsl, &reflection)
+            let own = OwnTextures::none(gpu);
+            Program::new(gpu, "built-in tonemap", Role::Tonemap, (wgsl, &reflection), &own)
         });
         Preparer {
             gpu: gpu.clone(),
@@ -201,8 +203,8 @@ impl Preparer {
         report: &mut ApplyReport,
     ) -> Option<Arc<Program>> {
         let target = revision.table.targets.get(name)?;
-        let device = &self.gpu.device;
-        let resolved = self.programs.resolve(&self.gpu, name, Key::of(target), || {
+        let gpu = &self.gpu;
+        let resolved = self.programs.resolve(gpu, name, Key::of(target), || {
             let meta: ShaderMeta = read_meta(name, target, "shader")?;
             if meta.role != role {
                 return Err(Diagnostic::error(format!(
@@ -211,9 +213,10 @@ impl Preparer {
                 )));
             }
             let (wgsl, reflection) = read_shader(revision, name)?;
-            let program = Program::new(device, name, role, &wgsl, &reflection)?;
+            let own = OwnTextures::upload(gpu, revision, name, &meta.srgb_textures)?;
+            let program = Program::new(gpu, name, role, (&wgsl, &reflection), &own)?;
             // Made here, because only a pipeline shows whether module and layout fit.
-            program.pipeline(device, Raster::of_role(role));
+            program.pipeline(&gpu.device, Raster::of_role(role));
             Ok(program)
         });
         report.take(name, resolved)

@@ -4,13 +4,14 @@ use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
 use kiln_diagnostic::Diagnostic;
+use kiln_gpu::Gpu;
 use kiln_scene::Vertex;
 use kiln_shader::{Binding, BindingKind, Member, Reflection, Stage};
-use wgpu::util::DeviceExt as _;
 
+use crate::own::OwnTextures;
 use crate::slot::Slot;
 use crate::target::Role;
-use crate::uniform::{FrameValues, Value, draw_member, long_type_name, material_member, parameter_block};
+use crate::uniform::{FrameValues, Value, draw_member, long_type_name, material_member};
 
 /// Format of the image that material and background shaders write.
 pub(crate) const HDR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
@@ -53,6 +54,8 @@ impl Raster {
 pub(crate) struct Bound {
     pub binding: u32,
     pub slot: Slot,
+    /// The variable's name.
+    pub name: String,
     /// Of uniforms: size and members.
     pub block: Option<(u32, Vec<Member>)>,
 }
@@ -75,8 +78,8 @@ pub(crate) struct Program {
     pub groups: [Vec<Bound>; GROUP_COUNT],
     /// Layouts by group; `None` where nothing is declared.
     pub layouts: [Option<wgpu::BindGroupLayout>; GROUP_COUNT],
-    /// Group 3: the author's parameters.
-    pub parameter_group: Option<wgpu::BindGroup>,
+    /// Group 3: the author's parameters and textures.
+    pub own_group: Option<wgpu::BindGroup>,
     pipeline_layout: wgpu::PipelineLayout,
     pipelines: Mutex<HashMap<Raster, wgpu::RenderPipeline>>,
 }
@@ -84,14 +87,16 @@ pub(crate) struct Program {
 impl Program {
     /// Checks the interface and creates module and layouts. Faults that wgpu finds go to the error scope.
     pub fn new(
-        device: &wgpu::Device,
+        gpu: &Gpu,
         name: &str,
         role: Role,
-        wgsl: &str,
-        reflection: &Reflection,
+        (wgsl, reflection): (&str, &Reflection),
+        own: &OwnTextures,
     ) -> Result<Self, Diagnostic> {
+        let device = &gpu.device;
         let attributes = check_entry_points(name, role, reflection)?;
         let groups = check_bindings(name, role, &reflection.bindings)?;
+        own.check(name, &groups[3])?;
         let layouts =
             [0, 1, 2, 3].map(|group| create_layout(device, name, group, &groups[group], reflection));
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -104,8 +109,8 @@ impl Program {
             source: wgpu::ShaderSource::Wgsl(wgsl.into()),
         });
         let pipelines = Mutex::default();
-        let parameter_group = parameter_group(device, &layouts[3], &groups[3], reflection);
-        Ok(Program { parameter_group, role, module, attributes, groups, layouts, pipeline_layout, pipelines })
+        let own_group = own.group(gpu, layouts[3].as_ref(), &groups[3], reflection);
+        Ok(Program { own_group, role, module, attributes, groups, layouts, pipeline_layout, pipelines })
     }
 
     /// The pipeline for a raster state, created on first use.
@@ -237,16 +242,22 @@ fn check_bindings(
             }
             _ => None,
         };
-        groups[slot.group() as usize].push(Bound { binding: binding.binding, slot, block });
+        let name = binding.name.clone();
+        groups[slot.group() as usize].push(Bound { binding: binding.binding, slot, name, block });
     }
     Ok(groups)
 }
 
 fn check_binding(shader: &str, role: Role, binding: &Binding) -> Result<Slot, Diagnostic> {
     let name = &binding.name;
+    if let Some(own) = Slot::of_own(binding) {
+        return Ok(own);
+    }
     let Some(slot) = Slot::from_name(name) else {
         return Err(Diagnostic::error(format!("`{shader}` declares `{name}`, which Kiln does not know"))
-            .with_help("names that can be bound are listed in docs/shader-interface.md"));
+            .with_help(
+                "names that can be bound are listed in docs/shader-interface.md; your own stand in group 3",
+            ));
     };
     if [1, 2].contains(&slot.group()) && role != Role::Material {
         return Err(Diagnostic::error(format!("`{shader}` declares `{name}`, which only materials have")));
@@ -313,28 +324,6 @@ fn example_of(slot: Slot, member: &str) -> Option<Value> {
     }
 }
 
-/// The author's parameters with their first values.
-fn parameter_group(
-    device: &wgpu::Device,
-    layout: &Option<wgpu::BindGroupLayout>,
-    bounds: &[Bound],
-    reflection: &Reflection,
-) -> Option<wgpu::BindGroup> {
-    let (layout, bound) = (layout.as_ref()?, bounds.first()?);
-    let (size_bytes, members) = bound.block.as_ref()?;
-    let buffer = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some("params"),
-        contents: &parameter_block(*size_bytes, members, &reflection.parameters),
-        usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-    });
-    let entries = [wgpu::BindGroupEntry { binding: bound.binding, resource: buffer.as_entire_binding() }];
-    Some(device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("params"),
-        layout,
-        entries: &entries,
-    }))
-}
-
 fn create_layout(
     device: &wgpu::Device,
     name: &str,
@@ -390,8 +379,10 @@ fn binding_type(bound: &Bound) -> wgpu::BindingType {
         Slot::EnvSkybox | Slot::EnvIrradiance | Slot::EnvSpecular => {
             texture(wgpu::TextureViewDimension::Cube)
         }
-        Slot::LutGgx | Slot::HdrColor | Slot::MaterialTexture(_) => texture(wgpu::TextureViewDimension::D2),
-        Slot::EnvSampler | Slot::LutSampler | Slot::MaterialSampler(_) => {
+        Slot::LutGgx | Slot::HdrColor | Slot::MaterialTexture(_) | Slot::OwnTexture => {
+            texture(wgpu::TextureViewDimension::D2)
+        }
+        Slot::EnvSampler | Slot::LutSampler | Slot::MaterialSampler(_) | Slot::OwnSampler => {
             wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)
         }
     }

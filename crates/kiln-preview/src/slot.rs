@@ -1,7 +1,7 @@
 //! The names of `docs/shader-interface.md`: what Kiln can bind, and where.
 
 use kiln_scene::{Material, TextureRef};
-use kiln_shader::BindingKind;
+use kiln_shader::{Binding, BindingKind};
 
 /// A material texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -85,6 +85,10 @@ pub(crate) enum Slot {
     Draw,
     /// The author's own parameters.
     Params,
+    /// One of the author's own textures.
+    OwnTexture,
+    /// And what it is read through.
+    OwnSampler,
 }
 
 const FIXED: [(Slot, &str); 11] = [
@@ -110,12 +114,22 @@ impl Slot {
         fixed.or_else(texture).or_else(sampler)
     }
 
+    /// A texture or sampler of group 3, whatever its name.
+    pub fn of_own(binding: &Binding) -> Option<Self> {
+        let slot = match &binding.kind {
+            BindingKind::Texture { .. } => Slot::OwnTexture,
+            BindingKind::Sampler { .. } => Slot::OwnSampler,
+            _ => return None,
+        };
+        (binding.group == slot.group() && slot.accepts(&binding.kind)).then_some(slot)
+    }
+
     /// The bind group it belongs to: 0 frame, 1 material, 2 draw, 3 the author's own.
     pub fn group(self) -> u32 {
         match self {
             Slot::Material | Slot::MaterialTexture(_) | Slot::MaterialSampler(_) => 1,
             Slot::Draw => 2,
-            Slot::Params => 3,
+            Slot::Params | Slot::OwnTexture | Slot::OwnSampler => 3,
             _ => 0,
         }
     }
@@ -140,8 +154,8 @@ impl Slot {
         match self {
             Slot::Frame | Slot::Material | Slot::Draw | Slot::Params => "uniform",
             Slot::EnvSkybox | Slot::EnvIrradiance | Slot::EnvSpecular => "texture_cube<f32>",
-            Slot::LutGgx | Slot::HdrColor | Slot::MaterialTexture(_) => "texture_2d<f32>",
-            Slot::EnvSampler | Slot::LutSampler | Slot::MaterialSampler(_) => "sampler",
+            Slot::LutGgx | Slot::HdrColor | Slot::MaterialTexture(_) | Slot::OwnTexture => "texture_2d<f32>",
+            Slot::EnvSampler | Slot::LutSampler | Slot::MaterialSampler(_) | Slot::OwnSampler => "sampler",
         }
     }
 }

@@ -38,6 +38,9 @@ pub(crate) struct SceneMeta {
 #[derive(Clone, Debug, Deserialize)]
 pub(crate) struct ShaderMeta {
     pub role: Role,
+    /// Which of its own textures hold sRGB-encoded colour.
+    #[serde(default)]
+    pub srgb_textures: Vec<String>,
 }
 
 impl ShaderMeta {

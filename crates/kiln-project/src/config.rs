@@ -57,6 +57,17 @@ pub struct ShaderConfig {
     pub variants: BTreeSet<BTreeSet<String>>,
     /// Languages that its variants are written in, for engines.
     pub emit: BTreeSet<Language>,
+    /// The author's own textures, by the names of the shader's variables.
+    pub textures: BTreeMap<String, OwnTexture>,
+}
+
+/// A texture that no material has.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OwnTexture {
+    /// A PNG or JPEG file.
+    pub source: String,
+    /// Whether it holds sRGB-encoded colour; else its values are read as they are.
+    pub is_srgb: bool,
 }
 
 /// What a shader is used for.
@@ -300,6 +311,7 @@ fn read_shader(section: &mut Section, name: &str) -> ShaderConfig {
         role: section.choice("role", &roles).unwrap_or(by_name),
         variants: variants.iter().map(|variant| parse_variant(variant)).collect(),
         emit: read_languages(section),
+        textures: read_textures(section),
     }
 }
 
@@ -307,6 +319,31 @@ fn read_shader(section: &mut Section, name: &str) -> ShaderConfig {
 fn read_define(text: &str) -> (String, String) {
     let (name, value) = text.split_once('=').unwrap_or((text, "1"));
     (name.trim().to_owned(), value.trim().to_owned())
+}
+
+/// `textures = ["noise=textures/noise.png", "ramp=textures/ramp.png srgb"]`.
+fn read_textures(section: &mut Section) -> BTreeMap<String, OwnTexture> {
+    let mut textures = BTreeMap::new();
+    for text in section.texts("textures").unwrap_or_default() {
+        let is_variable = |name: &str| {
+            let word = |character: char| character.is_ascii_alphanumeric() || character == '_';
+            name.chars().all(word) && name.starts_with(|first: char| first.is_ascii_alphabetic())
+        };
+        match text.split_once('=').map(|(name, file)| (name.trim(), file.trim())) {
+            Some((name, file)) if is_variable(name) && !file.is_empty() => {
+                let (source, is_srgb) = file.strip_suffix(" srgb").map_or((file, false), |file| (file, true));
+                let texture = OwnTexture { source: normalised(source.trim()), is_srgb };
+                textures.insert(name.to_owned(), texture);
+            }
+            _ => {
+                let message = format!("`textures` has `{text}`, which names no variable and file");
+                let help =
+                    "write \"noise=textures/noise.png\", or \"ramp=textures/ramp.png srgb\" for colours";
+                section.fail(message, section.place("textures"), Some(help.to_owned()));
+            }
+        }
+    }
+    textures
 }
 
 fn read_languages(section: &mut Section) -> BTreeSet<Language> {

@@ -230,6 +230,11 @@ fn target_files(store: &Store, name: &str, target: &Target) -> Result<Vec<Output
             let stem = name.rsplit_once('/').map_or(name, |(stem, _)| stem);
             contents.into_iter().map(|(part, bytes)| (format!("{stem}.{part}"), bytes)).collect()
         }
+        // The author has the textures already.
+        "shader" => {
+            let own = contents.into_iter().filter(|(part, _)| !part.starts_with("texture."));
+            own.map(|(part, bytes)| (part_path(name, part), bytes)).collect()
+        }
         _ => contents.into_iter().map(|(part, bytes)| (part_path(name, part), bytes)).collect(),
     })
 }

@@ -10,9 +10,9 @@ use kiln_worker::{Died, Sources};
 use serde_json::{Value, json};
 
 use crate::config::variant_name;
-use crate::environment::{command, failure};
+use crate::environment::{command, failure, success};
 use crate::plan::{PartSpec, Planner, no_content, rank, unreadable};
-use crate::{PROJECT_FILE, Role, ShaderConfig};
+use crate::{OwnTexture, PROJECT_FILE, Role, ShaderConfig};
 
 /// Version of the compiler behind both the scan and the action.
 const COMPILE_RECIPE: u32 = 2;
@@ -56,6 +56,9 @@ pub(crate) fn plan_shader(
         (json!(kiln_shader::scan(program, &mut read).features), Vec::new())
     })?;
     let known: BTreeSet<String> = serde_json::from_value(scan.found.clone()).unwrap_or_default();
+    let textures = plan_textures(planner, engine, config);
+    let srgb: Vec<&String> =
+        config.textures.iter().filter(|(_, texture)| texture.is_srgb).map(|(name, _)| name).collect();
     let mut compiled: BTreeMap<BTreeSet<String>, ActionId> = BTreeMap::new();
     for features in variants.of(name, config) {
         let variant = variant_name(&features);
@@ -81,12 +84,48 @@ pub(crate) fn plan_shader(
                 vec![PartSpec::Folder(emit, FILES)],
             );
         }
-        let meta =
+        let mut meta =
             json!({"shader": name, "role": config.role.name(), "features": crate::parse_variant(&variant)});
-        let parts = vec![PartSpec::one(compile, "wgsl"), PartSpec::one(compile, "reflection")];
+        if !srgb.is_empty() {
+            meta["srgb_textures"] = json!(srgb);
+        }
+        let mut parts = vec![PartSpec::one(compile, "wgsl"), PartSpec::one(compile, "reflection")];
+        parts.extend(textures.iter().cloned());
         planner.target(format!("shader/{name}/{variant}"), "shader", meta, parts);
     }
     Ok(())
+}
+
+/// Checks the author's own textures: parts `texture.NAME` of each variant, the files as they are.
+fn plan_textures(planner: &mut Planner, engine: &Engine, config: &ShaderConfig) -> Vec<PartSpec> {
+    let mut parts = Vec::new();
+    for (name, OwnTexture { source, .. }) in &config.textures {
+        let unreadable = unreadable(engine, source);
+        let input = Input::Source { path: source.clone(), digest: engine.source(source).digest() };
+        let action = planner.graph.add(Action {
+            name: format!("check texture {source}"),
+            command: command("texture", 1, json!({"unreadable": unreadable}), &["file"]),
+            inputs: vec![input],
+            rank: rank::SHADER,
+            memory: little_memory(),
+            perform: Arc::new(move |inputs| {
+                let Some(bytes) = inputs.bytes(0)? else {
+                    let help = "create it, or correct `textures` in kiln.toml";
+                    return Ok(failure(no_content("texture", unreadable.as_deref()).with_help(help)));
+                };
+                Ok(match kiln_scene::decode_image(&bytes) {
+                    Ok(_) => success("file", bytes.to_vec(), Value::Null),
+                    Err(reason) => failure(
+                        Diagnostic::error(format!("this texture cannot be read: {reason}"))
+                            .with_help("save it as PNG or JPEG"),
+                    ),
+                })
+            }),
+        });
+        planner.subjects.insert(action, source.clone());
+        parts.push(PartSpec::One { action, output: "file".to_owned(), part: format!("texture.{name}") });
+    }
+    parts
 }
 
 /// The outputs of an [`emit_action`]: `files/spv`, or `files/vert.glsl` …, and `files/LANGUAGE.json`, which says what is

@@ -50,6 +50,14 @@ pub(crate) fn decode(bytes: &[u8], texels_left: usize) -> Result<Picture, String
     Ok(Picture { decoded, encoded: bytes.to_vec(), mime_type, range })
 }
 
+/// Decodes a PNG or JPEG file that is no part of a scene, within the limits of one.
+///
+/// # Errors
+/// A sentence: unknown format, damaged data, too large.
+pub fn decode_image(bytes: &[u8]) -> Result<Image8, String> {
+    decode(bytes, limits::TEXEL_COUNT_MAX / 4).map(|picture| picture.decoded)
+}
+
 /// Encodes a generated picture as PNG.
 ///
 /// # Errors

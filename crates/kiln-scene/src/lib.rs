@@ -16,6 +16,7 @@
 
 pub use effect::variant_name;
 pub use error::SceneError;
+pub use images::decode_image;
 
 pub use pack::{MaterialEffects, Packed, SceneSummary, load, pack};
 pub use scene::*;

@@ -146,7 +146,7 @@ impl Finder<'_> {
             let before = text[..range.start].trim_end();
             let line = Span::new(text, before.len()..before.len()).line;
             Some(format!("a `;` may be missing at the end of line {line}"))
-        } else if message.contains("`f16`") {
+        } else if message.contains("`f16`") || text.get(range).is_some_and(|text| text.contains("f16")) {
             Some("Kiln compiles for devices without optional features: use `f32`".to_owned())
         } else {
             None

@@ -1,6 +1,6 @@
 //! `kiln bake`: one build, for people and for CI.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
@@ -170,6 +170,31 @@ struct Report {
     complaints: Vec<Diagnostic>,
 }
 
+/// Shader variants of a build.
+struct Variants {
+    /// Targets.
+    asked: usize,
+    /// Actions behind them: sets of features that can differ.
+    compiled: usize,
+    /// Texts that came out.
+    artefacts: usize,
+}
+
+impl Variants {
+    fn of(built: &Built) -> Variants {
+        let asked = built.plan.targets.iter().filter(|spec| spec.kind == "shader");
+        let actions: BTreeSet<_> = asked.clone().map(|spec| spec.parts[0].action()).collect();
+        let texts =
+            asked.clone().filter_map(|spec| Some(built.targets.get(&spec.name)?.parts.first()?.digest));
+        let artefacts: BTreeSet<_> = texts.collect();
+        Variants { asked: asked.count(), compiled: actions.len(), artefacts: artefacts.len() }
+    }
+
+    fn to_json(&self) -> serde_json::Value {
+        json!({"asked": self.asked, "compiled": self.compiled, "artefacts": self.artefacts})
+    }
+}
+
 impl Report {
     fn new(engine: &Engine, built: Built, effect: Effect) -> Report {
         let mut complaints = Vec::new();
@@ -212,6 +237,11 @@ impl Report {
             report::work_lines(&work)
         };
         lines.iter().for_each(|line| say!("{line}"));
+        let Variants { asked, compiled, artefacts } = Variants::of(built);
+        if work.ran.iter().any(|action| action.name.starts_with("compile ")) {
+            let shared = asked.saturating_sub(artefacts);
+            say!("shader variants: {asked} asked, {compiled} compiled, {shared} shared");
+        }
         report::print_diagnostics(&built.diagnostics, !work.ran.is_empty());
         report::print_diagnostics(&self.complaints, true);
         say!(
@@ -324,6 +354,7 @@ impl Report {
             "actions": actions.collect::<Vec<_>>(),
             "targets": targets.collect::<serde_json::Map<_, _>>(),
             "diagnostics": built.diagnostics.iter().chain(&self.complaints).collect::<Vec<_>>(),
+            "shader_variants": Variants::of(built).to_json(),
             "plan_ms": built.plan_ms,
             "run_ms": built.run_ms,
             "build": self.build_number,
