@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use kiln_diagnostic::{Diagnostic, Severity, Span};
+use kiln_diagnostic::{Diagnostic, Span};
 
 use crate::front::{self, Fault};
 use crate::join::Linked;
@@ -57,23 +57,15 @@ pub fn warnings(graph: &Graph, linked: &Linked, warnings: Vec<Warning>) -> Vec<D
     let root = graph.modules.first().map_or("", |module| module.path.as_str());
     let finder = Finder { graph, linked, root };
     let mut diagnostics = Vec::new();
-    let allowances = Allowances::read(graph, &mut diagnostics);
+    let files = graph.modules.iter().map(|module| (module.path.as_str(), &*module.text));
+    let allowances = Allowances::read(files, &mut diagnostics);
     for Warning { rule, finding, help } in warnings {
         if diagnostics.len() >= limits::WARNINGS_MAX {
             let message = format!("only the first {} warnings are shown", limits::WARNINGS_MAX);
             diagnostics.push(Diagnostic::warning(message).in_file(root));
             break;
         }
-        let main = finding.labels.first().map(|(range, _)| range.clone());
-        let origin = main.and_then(|range| linked.origin(range));
-        let mut diagnostic = finder.diagnostic(finding);
-        let line = diagnostic.span.as_ref().map_or(0, |span| span.line);
-        if origin.is_some_and(|(module, _)| allowances.allow(module, line, rule)) {
-            continue;
-        }
-        diagnostic.severity = Severity::Warning;
-        diagnostic.help = Some(format!("{help}; or say `// kiln: allow({}) why`", rule.name()));
-        diagnostics.push(diagnostic);
+        diagnostics.extend(allowances.warn(finder.diagnostic(finding), rule, &help));
     }
     diagnostics
 }

@@ -121,21 +121,20 @@ impl Program {
 /// `FEATURE_SHEEN`. `read` gets paths relative to the project and is asked at most once for each.
 pub fn compile(program: &Program, features: &BTreeSet<String>, read: &mut Read<'_>) -> Outcome {
     match program.is_glsl() {
-        true => glsl::compile(program, features, read),
+        true => glsl::compile(program, features, false, read),
         false => wgsl::compile(program.subject(), features, false, read),
     }
 }
 
 /// Does what [`compile`] does, and warns of what is valid but doubtful: arguments at the edge of a function's
 /// domain, derivatives in control flow that is not uniform, and what is slow for no reason. A warning stands at
-/// its author's file and line, as an error does, and is no error: there is a shader all the same. WGSL only: GLSL is
-/// compiled as by [`compile`].
+/// its author's file and line, as an error does, and is no error: there is a shader all the same.
 ///
 /// `// kiln: allow(domain) why`, with the name of the lint that a warning ends with, on its line or the line
 /// above allows it.
 pub fn lint(program: &Program, features: &BTreeSet<String>, read: &mut Read<'_>) -> Outcome {
     match program.is_glsl() {
-        true => glsl::compile(program, features, read),
+        true => glsl::compile(program, features, true, read),
         false => wgsl::compile(program.subject(), features, true, read),
     }
 }

@@ -17,7 +17,8 @@ use std::rc::Rc;
 use kiln_diagnostic::Diagnostic;
 
 use crate::link::Read;
-use crate::{Compiled, Outcome, Program, Scan, Stage, front, parameter};
+use crate::lint::{Allowances, Warning};
+use crate::{Compiled, Outcome, Program, Scan, Stage, front, limits, parameter};
 use declare::Item;
 use lex::Token;
 use source::Sources;
@@ -76,12 +77,12 @@ impl Parsed {
 }
 
 /// Compiles a program of one to three stages, each of its roots another one. The feature `sheen` is the macro
-/// `FEATURE_SHEEN` with value 1.
-pub fn compile(program: &Program, features: &BTreeSet<String>, read: &mut Read<'_>) -> Outcome {
+/// `FEATURE_SHEEN` with value 1. With `lints`, also warns of what is doubtful.
+pub fn compile(program: &Program, features: &BTreeSet<String>, lints: bool, read: &mut Read<'_>) -> Outcome {
     let mut sources = Sources::new(read);
     let mut named = BTreeSet::new();
     let stages = load(&mut sources, program, features, &mut named);
-    let mut compiled = if has_errors(&sources) { None } else { translate(&mut sources, &stages) };
+    let mut compiled = if has_errors(&sources) { None } else { translate(&mut sources, &stages, lints) };
     if let Some(compiled) = &mut compiled {
         let annotations = annotations(&mut sources);
         compiled.reflection.parameters = parameter::parameters(&compiled.reflection, annotations);
@@ -197,7 +198,7 @@ fn stage_of(sources: &mut Sources<'_, '_>, path: &str, pragma: Option<&Token>) -
 }
 
 /// Everything after preprocessing.
-fn translate(sources: &mut Sources<'_, '_>, stages: &[Parsed]) -> Option<Compiled> {
+fn translate(sources: &mut Sources<'_, '_>, stages: &[Parsed], lints: bool) -> Option<Compiled> {
     check_main(sources, stages);
     bindings::check_equal(sources, stages);
     let interfaces = locations::assign(sources, stages);
@@ -213,11 +214,18 @@ fn translate(sources: &mut Sources<'_, '_>, stages: &[Parsed]) -> Option<Compile
     }
     let names: BTreeMap<(u32, u32), String> = bound.of.iter().map(|(name, at)| (*at, name.clone())).collect();
     let mut written = Vec::new();
+    let mut diagnostics = Vec::new();
+    let files = sources.files.iter().map(|file| (file.path.as_str(), &*file.text));
+    let allowances = if lints { Allowances::read(files, &mut diagnostics) } else { Allowances::default() };
+    sources.diagnostics.append(&mut diagnostics);
     for (stage, text) in stages.iter().zip(&texts) {
-        let found = match stage_module::translate(&text.text, stage.stage, &names) {
-            Ok(Ok(wgsl)) => {
+        let found: Vec<Diagnostic> = match stage_module::translate(&text.text, stage.stage, &names, lints) {
+            Ok(Ok((wgsl, warnings))) => {
                 written.push((wgsl, stage::ending(stage.stage)));
-                continue;
+                let warn = |Warning { rule, finding, help }| {
+                    allowances.warn(explain::of_stage(sources, stage, text, finding), rule, &help)
+                };
+                warnings.into_iter().take(limits::WARNINGS_MAX).filter_map(warn).collect()
             }
             Ok(Err(findings)) => {
                 findings.into_iter().map(|finding| explain::of_stage(sources, stage, text, finding)).collect()

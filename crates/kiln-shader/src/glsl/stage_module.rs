@@ -8,17 +8,21 @@ use naga::{AddressSpace, Barrier, Block, Module, Statement, TypeInner};
 use super::{lower, stage};
 use crate::explain::Finding;
 use crate::front::{self, Fault};
+use crate::lint::{self, Warning};
 use crate::{Stage, canonical, describe};
 
-/// What naga made of a stage: its WGSL, or what is wrong.
-pub type Made = Result<String, Vec<Finding>>;
+/// What naga made of a stage: its WGSL and what is doubtful about it, or what is wrong.
+pub type Made = Result<(String, Vec<Warning>), Vec<Finding>>;
 
-/// Translates a stage. `names` are those of the variables at each group and binding.
-pub fn translate(text: &str, stage: Stage, names: &BTreeMap<(u32, u32), String>) -> Result<Made, Fault> {
-    front::on_deep_stack(Fault::Internal, || run(text, stage, names))
+/// Variables' names by group and binding.
+pub type Names = BTreeMap<(u32, u32), String>;
+
+/// Translates a stage; with `lints`, also says what is doubtful.
+pub fn translate(text: &str, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fault> {
+    front::on_deep_stack(Fault::Internal, || run(text, stage, names, lints))
 }
 
-fn run(text: &str, stage: Stage, names: &BTreeMap<(u32, u32), String>) -> Result<Made, Fault> {
+fn run(text: &str, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fault> {
     let options = Options::from(stage::for_naga(stage));
     let mut module = match Frontend::default().parse(&options, text) {
         Ok(module) => module,
@@ -40,7 +44,8 @@ fn run(text: &str, stage: Stage, names: &BTreeMap<(u32, u32), String>) -> Result
     canonical::strip_unused(&mut module);
     let info =
         front::validate(&module).map_err(|error| Fault::Internal(format!("after compaction: {error:?}")))?;
-    canonical::emit(&module, &info).map(Ok).map_err(Fault::Internal)
+    let warnings = if lints { lint::check(&module, &info) } else { Vec::new() };
+    canonical::emit(&module, &info).map(|wgsl| Ok((wgsl, warnings))).map_err(Fault::Internal)
 }
 
 /// Gives variables the names that Kiln binds by, and the entry point its own.

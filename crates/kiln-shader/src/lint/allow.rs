@@ -1,32 +1,34 @@
 //! Comments by which an author allows a finding: `// kiln: allow(domain) the caller has checked it`.
 
-use kiln_diagnostic::Diagnostic;
+use kiln_diagnostic::{Diagnostic, Severity};
 
 use super::Rule;
-use crate::link::Graph;
 
 const MARK: &str = "// kiln: allow(";
 
-/// Allowances of all modules.
+/// Allowances of all files.
 #[derive(Debug, Default)]
 pub struct Allowances {
-    /// Module, line from 1, rule.
-    found: Vec<(usize, u32, Rule)>,
+    /// File, line from 1, rule.
+    found: Vec<(String, u32, Rule)>,
 }
 
 impl Allowances {
-    /// Reads those of a graph; what is wrong with them is added to `diagnostics`.
-    pub fn read(graph: &Graph, diagnostics: &mut Vec<Diagnostic>) -> Allowances {
+    /// Reads those of files, each with its path and text; what is wrong with them is added to `diagnostics`.
+    pub fn read<'a>(
+        files: impl Iterator<Item = (&'a str, &'a str)>,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Allowances {
         let mut allowances = Allowances::default();
-        for (index, module) in graph.modules.iter().enumerate() {
+        for (path, whole) in files {
             let mut start = 0;
-            for (line, text) in (1..).zip(module.text.split_inclusive('\n')) {
+            for (line, text) in (1..).zip(whole.split_inclusive('\n')) {
                 if let Some(at) = text.find(MARK) {
                     match parse(&text[at + MARK.len()..]) {
-                        Ok(rule) => allowances.found.push((index, line, rule)),
+                        Ok(rule) => allowances.found.push((path.to_owned(), line, rule)),
                         Err((message, help)) => {
                             let range = start + at..start + text.trim_end().len();
-                            let warning = Diagnostic::warning(message).at(&module.path, &module.text, range);
+                            let warning = Diagnostic::warning(message).at(path, whole, range);
                             diagnostics.push(warning.with_help(help));
                         }
                     }
@@ -37,10 +39,18 @@ impl Allowances {
         allowances
     }
 
-    /// Whether `rule` may be broken on `line` of module `module`.
-    pub fn allow(&self, module: usize, line: u32, rule: Rule) -> bool {
-        let is_near = |at: u32| at == line || at + 1 == line;
-        self.found.iter().any(|(of, at, allowed)| *of == module && is_near(*at) && *allowed == rule)
+    /// Makes a warning of a finding that stands at its author's place, unless the author allows it there.
+    pub fn warn(&self, mut finding: Diagnostic, rule: Rule, help: &str) -> Option<Diagnostic> {
+        let line = finding.span.as_ref().map_or(0, |span| span.line);
+        let is_here = |(file, at, allowed): &(String, u32, Rule)| {
+            finding.file.as_ref() == Some(file) && (*at == line || at + 1 == line) && *allowed == rule
+        };
+        if self.found.iter().any(is_here) {
+            return None;
+        }
+        finding.severity = Severity::Warning;
+        finding.help = Some(format!("{help}; or say `// kiln: allow({}) why`", rule.name()));
+        Some(finding)
     }
 }
 

@@ -60,7 +60,7 @@ impl Walk<'_, '_> {
     }
 
     fn warn(&mut self, rule: Rule, handle: Handle<Expression>, message: String, help: &str) {
-        self.lint.warn(rule, self.function.expressions.get_span(handle), message, help, None);
+        self.lint.warn(rule, self.span(handle), message, help, None);
     }
 
     fn check_power(&mut self, handle: Handle<Expression>, exponent: Handle<Expression>) {
@@ -100,7 +100,7 @@ impl Walk<'_, '_> {
     fn check_in_step(&mut self, handle: Handle<Expression>, what: &str, help: &str) {
         let Some(cause) = self.divergence else { return };
         let message = format!("{what} is taken where neighbouring pixels may not be");
-        let span = self.function.expressions.get_span(handle);
+        let span = self.span(handle);
         self.lint.warn(Rule::Uniformity, span, message, help, Some((cause, "they part at")));
     }
 

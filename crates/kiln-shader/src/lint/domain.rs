@@ -1,6 +1,6 @@
 //! Functions at the edge of their domain.
 
-use naga::{BinaryOperator, Expression, Handle, MathFunction};
+use naga::{BinaryOperator, Expression, Handle, MathFunction, Span};
 
 use super::Rule;
 use super::range::{Number, Range};
@@ -27,8 +27,16 @@ impl Walk<'_, '_> {
         if self.is_deselected(handle) {
             return;
         }
-        let span = self.function.expressions.get_span(handle);
+        let span = self.span(handle);
         self.lint.warn(Rule::Domain, span, hazard.message, hazard.help, None);
+    }
+
+    /// Where an expression stands. naga's GLSL front end does not know it for calls of functions: then where the operand
+    /// that was read last stands.
+    pub fn span(&self, handle: Handle<Expression>) -> Span {
+        let before = self.function.expressions.iter().take(handle.index() + 1);
+        let spans = before.map(|(handle, _)| self.function.expressions.get_span(handle));
+        spans.filter(|span| span.is_defined()).last().unwrap_or_default()
     }
 
     fn hazard(&self, handle: Handle<Expression>) -> Option<Hazard> {

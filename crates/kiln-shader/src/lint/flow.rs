@@ -313,7 +313,7 @@ impl<'m> Walk<'_, 'm> {
 
     fn diverge(&mut self, condition: Handle<Expression>) {
         if !self.value(condition).is_uniform() {
-            let span = self.function.expressions.get_span(condition);
+            let span = self.span(condition);
             self.divergence = self.divergence.or(Some(span));
         }
     }

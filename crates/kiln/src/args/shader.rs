@@ -54,7 +54,7 @@ pub(crate) struct CheckArgs {
     #[arg(long)]
     pub(crate) deny_warnings: bool,
     /// Leave out warnings of what is valid but doubtful: arguments at the edge of a function's domain, derivatives in
-    /// control flow that is not uniform, what is slow for no reason (WGSL only)
+    /// control flow that is not uniform, what is slow for no reason
     #[arg(long)]
     pub(crate) no_lint: bool,
     /// Print JSON instead of text
