@@ -15,7 +15,14 @@ pub type Made = Result<String, Vec<Finding>>;
 
 /// Translates a stage. `names` are those of the variables at each group and binding.
 pub fn translate(text: &str, stage: Stage, names: &BTreeMap<(u32, u32), String>) -> Result<Made, Fault> {
-    front::on_deep_stack(Fault::Internal, || run(text, stage, names))
+    match front::on_deep_stack(Fault::Internal, || run(text, stage, names)) {
+        // naga's GLSL front end panics where its WGSL front end says where the type is.
+        Err(Fault::Internal(panic)) if panic.contains("LayoutError") && panic.contains("TooLarge") => {
+            let message = "an array or struct has 2 GiB or more".to_owned();
+            Ok(Err(vec![Finding { message, notes: Vec::new(), labels: Vec::new() }]))
+        }
+        made => made,
+    }
 }
 
 fn run(text: &str, stage: Stage, names: &BTreeMap<(u32, u32), String>) -> Result<Made, Fault> {
