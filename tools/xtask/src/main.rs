@@ -30,6 +30,8 @@ cargo xtask bench bake […]        error and cost of prefiltered maps beside a 
                                   one part alone; --huge: memory of a 16384×8192 panorama; panoramas from $KILN_CORPUS
 cargo xtask faults [COUNT]        kill COUNT processes at random moments and flip COUNT bits (default 1000)
 cargo xtask fuzz [COUNT] [SEED]   decode COUNT damaged copies of each image file of the tests (default 100000)
+cargo xtask fuzz shaders [COUNT] [SEED]
+                                  compile COUNT damaged, COUNT random WGSL and COUNT random GLSL shaders in the worker (default 10000)
 cargo xtask corpus [OUT]          bake and render the files of $KILN_CORPUS into OUT (default target/corpus)
 cargo xtask size                  build with and without the preview and compare time and size
 ";
@@ -47,6 +49,9 @@ fn main() -> ExitCode {
         ["faults"] => test::faults("1000"),
         ["faults", count] => test::faults(count),
         ["fuzz"] => test::fuzz(None, None),
+        ["fuzz", "shaders"] => test::fuzz_shaders(None, None),
+        ["fuzz", "shaders", count] => test::fuzz_shaders(Some(count), None),
+        ["fuzz", "shaders", count, seed] => test::fuzz_shaders(Some(count), Some(seed)),
         ["fuzz", count] => test::fuzz(Some(count), None),
         ["fuzz", count, seed] => test::fuzz(Some(count), Some(seed)),
         ["bench", edits] => match edits.parse() {
