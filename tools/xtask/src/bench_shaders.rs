@@ -135,7 +135,9 @@ impl Bench {
         println!("\n{VARIANTS} of the 2^{} variants of pbr.wgsl", features.len());
         let (compiled, together_s) = check(&names)?;
         let together = compiled as f64 / together_s;
-        println!("  one process: {compiled} compiled in {together_s:.2} s, {together:.0} a second");
+        println!(
+            "  one process, a worker for each CPU: {compiled} compiled in {together_s:.2} s, {together:.0} a second"
+        );
         let mut times = Vec::new();
         for name in names.iter().step_by(VARIANTS / OWN_PROCESSES) {
             times.push(check(std::slice::from_ref(name))?.1 * 1e3);
