@@ -5,6 +5,9 @@
 //! that it leaves alone, and put back into its text; a local that then has the same name gets another.
 //! Names inside functions matter to nobody outside: they are numbered, so that renaming one changes nothing.
 //! [`crate::SourceMap`] has the author's.
+//!
+//! Canonical text compiles to itself, but where a `let` names a constant: naga's writer puts the constant where the name
+//! stood, and its parser then works out what it could not before.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -53,7 +56,36 @@ pub fn emit(module: &Module, info: &ModuleInfo) -> Result<String, String> {
     number_locals(&mut module);
     let text = naga::back::wgsl::write_string(&module, info, WriterFlags::empty())
         .map_err(|error| format!("cannot write canonical WGSL: {error}"))?;
-    restore_names(&text, &kept)
+    restore_names(&number_values(&text)?, &kept)
+}
+
+/// Numbers what `let` names, in the order of the text and in each function from 1: naga's writer names values of its own
+/// after their place in the module, which is another when the text is read again. No function or type is called
+/// `value_1`, because naga changes names that end in digits.
+fn number_values(text: &str) -> Result<String, String> {
+    let tokens = token::tokenize(text).map_err(|_| "canonical text does not tokenise".to_owned())?;
+    let mut numbered = String::with_capacity(text.len());
+    let mut names: BTreeMap<&str, String> = BTreeMap::new();
+    let mut at = 0;
+    for (index, token) in tokens.iter().enumerate() {
+        let word = &text[token.range()];
+        if word == "fn" {
+            names.clear();
+        }
+        let before = index.checked_sub(1).map(|before| tokens[before]);
+        if before.is_some_and(|before| before.is_word(text, "let")) {
+            let name = format!("value_{}", names.len() + 1);
+            names.insert(word, name);
+        }
+        let is_member = before.is_some_and(|before| before.is('.'));
+        if let Some(name) = names.get(word).filter(|_| !is_member) {
+            numbered.push_str(&text[at..token.start]);
+            numbered.push_str(name);
+            at = token.end;
+        }
+    }
+    numbered.push_str(&text[at..]);
+    Ok(numbered)
 }
 
 /// Placeholders with the names they stand for.

@@ -68,13 +68,12 @@ fn check_length(text: &str) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Validates and reflects text that is canonical already: stages that were joined.
-pub fn compile_joined(text: String) -> Result<Compiled, Fault> {
+/// Compiles stages that were joined: each is canonical by itself, which leaves the order of their declarations open.
+pub fn compile_joined(text: &str) -> Result<Compiled, Fault> {
     on_deep_stack(Fault::Internal, || {
-        let module = naga::front::wgsl::parse_str(&text).map_err(|error| reparse_fault(&error, &text))?;
-        let info = validate(&module).map_err(|error| Fault::Source(validation_finding(&module, &error)))?;
-        let reflection = interface::reflect(&module, &info, &module).map_err(Fault::Internal)?;
-        Ok(Compiled { wgsl: text, reflection })
+        let mut module = naga::front::wgsl::parse_str(text).map_err(|error| reparse_fault(&error, text))?;
+        validate(&module).map_err(|error| Fault::Source(validation_finding(&module, &error)))?;
+        canonical(&mut module).map(|canonical| canonical.compiled)
     })
 }
 
@@ -108,14 +107,29 @@ fn compile(text: &str, lints: bool) -> Result<LinkedShader, Fault> {
     if module.entry_points.is_empty() {
         return Err(Fault::NoEntryPoint);
     }
-    canonical::strip_unused(&mut module);
-    let info = validate(&module).map_err(|error| Fault::Internal(format!("after compaction: {error:?}")))?;
-    let wgsl = canonical::emit(&module, &info).map_err(Fault::Internal)?;
-    let reparsed = naga::front::wgsl::parse_str(&wgsl).map_err(|error| reparse_fault(&error, &wgsl))?;
-    let reflection = interface::reflect(&module, &info, &reparsed).map_err(Fault::Internal)?;
+    let Canonical { compiled, reparsed, info } = canonical(&mut module)?;
     let functions = source_map::functions(&module, &reparsed);
     let warnings = if lints { lint::check(&module, &info) } else { Vec::new() };
-    Ok(LinkedShader { compiled: Compiled { wgsl, reflection }, functions, warnings })
+    Ok(LinkedShader { compiled, functions, warnings })
+}
+
+/// A shader in its canonical form.
+struct Canonical {
+    compiled: Compiled,
+    /// Its text, read back.
+    reparsed: Module,
+    /// Of the module that was written.
+    info: ModuleInfo,
+}
+
+/// Strips, emits and reflects a valid module.
+fn canonical(module: &mut Module) -> Result<Canonical, Fault> {
+    canonical::strip_unused(module);
+    let info = validate(module).map_err(|error| Fault::Internal(format!("after compaction: {error:?}")))?;
+    let wgsl = canonical::emit(module, &info).map_err(Fault::Internal)?;
+    let reparsed = naga::front::wgsl::parse_str(&wgsl).map_err(|error| reparse_fault(&error, &wgsl))?;
+    let reflection = interface::reflect(module, &info, &reparsed).map_err(Fault::Internal)?;
+    Ok(Canonical { compiled: Compiled { wgsl, reflection }, reparsed, info })
 }
 
 fn reparse_fault(error: &ParseError, wgsl: &str) -> Fault {

@@ -63,7 +63,7 @@ impl Bench {
         command
     }
 
-    fn init(&self, name: &str, width: &str) -> Result<PathBuf, String> {
+    pub(crate) fn init(&self, name: &str, width: &str) -> Result<PathBuf, String> {
         let project = self.folder.join(name);
         output_of(self.kiln("cache").arg("init").arg(&project).args(["--panorama-width", width]))?;
         Ok(project)
@@ -106,7 +106,6 @@ impl Bench {
     /// Edits files under a running daemon and a headless preview at 640×360.
     fn edits(&self, count: usize) -> Result<(), String> {
         let project = self.init("edits", "1024")?;
-        let text = |error: std::io::Error| error.to_string();
         let mut daemon = self.kiln("cache");
         let daemon = daemon.arg("watch").arg(&project).args(["--json", "--no-output"]).stdout(Stdio::piped());
         let mut daemon = daemon.spawn().map_err(text)?;
@@ -210,6 +209,17 @@ fn wait_for_frame(lines: &Receiver<String>) -> Result<f64, String> {
             return number.and_then(|number| number.parse().ok()).ok_or(format!("no time in {line}"));
         }
     }
+}
+
+pub(crate) fn text(error: std::io::Error) -> String {
+    error.to_string()
+}
+
+/// The number behind the first `key`.
+pub(crate) fn number(text: &str, key: &str) -> Result<f64, String> {
+    let (_, rest) = text.split_once(key).ok_or(format!("no {key}"))?;
+    let end = rest.find(|character: char| !"0123456789.eE+-".contains(character)).unwrap_or(rest.len());
+    rest[..end].parse().map_err(|error| format!("{key}: {error}"))
 }
 
 pub(crate) fn print_times(what: &str, times: &mut [f64]) {

@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant, SystemTime};
 
-use crate::bench::{Bench, Running, SETTLING, lines_of, print_times};
+use crate::bench::{Bench, Running, SETTLING, lines_of, number, print_times, text};
 use crate::shell::{cargo, output_of, step};
 
 const RUNS: usize = 20;
@@ -232,10 +232,6 @@ fn durable_write_us(folder: &Path) -> Result<f64, String> {
     Ok(spent.as_secs_f64() * 1e6 / f64::from(COUNT))
 }
 
-fn text(error: std::io::Error) -> String {
-    error.to_string()
-}
-
 fn write(project: &Path, name: &str, content: impl AsRef<[u8]>) -> Result<(), String> {
     let path = project.join(name);
     std::fs::create_dir_all(path.parent().unwrap_or(project)).map_err(text)?;
@@ -354,13 +350,6 @@ fn published(lines: &Receiver<String>) -> Result<String, String> {
             return Ok(line);
         }
     }
-}
-
-/// The number behind the first `key`.
-fn number(text: &str, key: &str) -> Result<f64, String> {
-    let (_, rest) = text.split_once(key).ok_or(format!("no {key}"))?;
-    let end = rest.find(|character: char| !"0123456789.eE+-".contains(character)).unwrap_or(rest.len());
-    rest[..end].parse().map_err(|error| format!("{key}: {error}"))
 }
 
 /// The number behind the first `key` after `mark`.

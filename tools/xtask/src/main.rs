@@ -14,8 +14,10 @@ use std::process::ExitCode;
 mod bench;
 mod bench_bake;
 mod bench_cache;
+mod bench_shaders;
 mod corpus;
 mod packages;
+mod shader_files;
 mod shell;
 mod test;
 
@@ -23,10 +25,13 @@ const HELP: &str = "\
 cargo xtask test [--no-install]   install what tests need where that is allowed, then run all tests, clippy, fmt and docs
 cargo xtask bench [EDITS]         save-to-frame of shader and HDR edits, no-op bake, bake of one panorama
 cargo xtask bench cache           no-op bakes, planning, overhead and hashing on generated projects of up to 10 000 files
+cargo xtask bench shaders         save to first diagnostic, variants a second, what an edit runs, shaders in all languages
 cargo xtask bench bake […]        error and cost of prefiltered maps beside a sampled estimator; accuracy, sampled, time, scaling:
                                   one part alone; --huge: memory of a 16384×8192 panorama; panoramas from $KILN_CORPUS
 cargo xtask faults [COUNT]        kill COUNT processes at random moments and flip COUNT bits (default 1000)
 cargo xtask fuzz [COUNT] [SEED]   decode COUNT damaged copies of each image file of the tests (default 100000)
+cargo xtask fuzz shaders [COUNT] [SEED]
+                                  compile COUNT damaged, COUNT random WGSL and COUNT random GLSL shaders in the worker (default 10000)
 cargo xtask corpus [OUT]          bake and render the files of $KILN_CORPUS into OUT (default target/corpus)
 cargo xtask size                  build with and without the preview and compare time and size
 ";
@@ -39,10 +44,14 @@ fn main() -> ExitCode {
         ["test", "--no-install"] => test::run(false),
         ["bench"] => bench::run(20),
         ["bench", "cache"] => bench_cache::run(),
+        ["bench", "shaders"] => bench_shaders::run(),
         ["bench", "bake", arguments @ ..] => bench_bake::run(arguments),
         ["faults"] => test::faults("1000"),
         ["faults", count] => test::faults(count),
         ["fuzz"] => test::fuzz(None, None),
+        ["fuzz", "shaders"] => test::fuzz_shaders(None, None),
+        ["fuzz", "shaders", count] => test::fuzz_shaders(Some(count), None),
+        ["fuzz", "shaders", count, seed] => test::fuzz_shaders(Some(count), Some(seed)),
         ["fuzz", count] => test::fuzz(Some(count), None),
         ["fuzz", count, seed] => test::fuzz(Some(count), Some(seed)),
         ["bench", edits] => match edits.parse() {

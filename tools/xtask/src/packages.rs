@@ -1,4 +1,4 @@
-//! System packages that the tests need: software Vulkan and a virtual display.
+//! System packages that the tests need: software Vulkan, a virtual display, and reference compilers of shaders.
 
 use std::path::Path;
 use std::process::Command;
@@ -8,17 +8,18 @@ use crate::shell::{has_program, output_of};
 /// Debian's package, and how to see that what it brings is there.
 type Package = (&'static str, fn() -> bool);
 
-const NEEDED: [Package; 2] = [("mesa-vulkan-drivers", has_vulkan_driver), ("xvfb", has_xvfb)];
+const NEEDED: [Package; 4] = [
+    ("mesa-vulkan-drivers", has_vulkan_driver),
+    ("xvfb", || has_program("Xvfb")),
+    ("spirv-tools", || has_program("spirv-val")),
+    ("glslang-tools", || has_program("glslangValidator")),
+];
 
 fn has_vulkan_driver() -> bool {
     let folders = ["/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d", "/usr/local/share/vulkan/icd.d"];
     let has_entry =
         |folder: &str| Path::new(folder).read_dir().is_ok_and(|mut entries| entries.next().is_some());
     folders.iter().any(|folder| has_entry(folder))
-}
-
-fn has_xvfb() -> bool {
-    has_program("Xvfb")
 }
 
 /// What is missing, by package.

@@ -66,6 +66,20 @@ pub(crate) fn fuzz(count: Option<&str>, seed: Option<&str>) -> Result<(), String
     step("fuzz", &mut tests)
 }
 
+/// Inputs of each kind that shaders are fuzzed with, where none are asked for.
+const SHADERS: &str = "10000";
+
+/// The tests that feed damaged and random shaders to the worker, likewise; they say what came of it.
+pub(crate) fn fuzz_shaders(count: Option<&str>, seed: Option<&str>) -> Result<(), String> {
+    let mut tests = cargo(&["test", "--release", "--workspace", "--test", "fuzz", "--", "--nocapture"]);
+    tests.env("KILN_FUZZ_COUNT", number(count.unwrap_or(SHADERS))?);
+    match seed {
+        Some(seed) => tests.env("KILN_FUZZ_SEED", number(seed)?),
+        None => tests.env_remove("KILN_FUZZ_SEED"),
+    };
+    step("fuzz shaders", &mut tests)
+}
+
 fn number(text: &str) -> Result<&str, String> {
     text.parse::<u64>().map(|_| text).map_err(|_| format!("`{text}` is no number"))
 }

@@ -269,7 +269,7 @@ fn link(
             return None;
         }
     };
-    match front::compile_joined(joined.clone()) {
+    match front::compile_joined(&joined) {
         Ok(mut compiled) => {
             restore_names(&mut compiled, stages, interfaces);
             Some(compiled)

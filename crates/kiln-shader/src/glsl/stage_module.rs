@@ -19,7 +19,14 @@ pub type Names = BTreeMap<(u32, u32), String>;
 
 /// Translates a stage; with `lints`, also says what is doubtful.
 pub fn translate(text: &str, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fault> {
-    front::on_deep_stack(Fault::Internal, || run(text, stage, names, lints))
+    match front::on_deep_stack(Fault::Internal, || run(text, stage, names, lints)) {
+        // naga's GLSL front end panics where its WGSL front end says where the type is.
+        Err(Fault::Internal(panic)) if panic.contains("LayoutError") && panic.contains("TooLarge") => {
+            let message = "an array or struct has 2 GiB or more".to_owned();
+            Ok(Err(vec![Finding { message, notes: Vec::new(), labels: Vec::new() }]))
+        }
+        made => made,
+    }
 }
 
 fn run(text: &str, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fault> {

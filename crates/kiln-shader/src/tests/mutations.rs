@@ -39,6 +39,13 @@ fn long_and_deep_expressions_are_refused_and_shorter_ones_are_not() {
     assert!(Case::of(&[("a.frag", &text)]).compile().compiled.is_some());
 }
 
+/// naga panics on these.
+#[test]
+fn types_larger_than_memory_are_refused() {
+    let text = "void main() { float x[3]; x[1] = 2.0; colour = vec4(x[1]); }\nfloat huge[2147483647];\nuniform vec4 tint;";
+    check_message(text, "an array or struct has 2 GiB or more");
+}
+
 /// Runs on naga's thread with its real stack: an overflow would abort the test binary.
 #[test]
 fn deepest_allowed_input_ends_in_a_result() {

@@ -1,8 +1,9 @@
 //! Which shaders a command is about, their variants, and compiling them.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::Context as _;
 use kiln_diagnostic::Diagnostic;
@@ -204,7 +205,7 @@ impl Subject {
             };
             Ok(Variant { names, outcome })
         };
-        variants.into_iter().map(one).collect()
+        in_parallel(variants.into_iter().collect(), one)
     }
 
     /// What is asked for without being known.
@@ -230,6 +231,27 @@ impl Variant {
     pub(super) fn is_good(&self) -> bool {
         self.outcome.is_library || self.outcome.compiled.is_some()
     }
+}
+
+/// Does `work` on all items, in as many threads as there are CPUs: each has a worker process of its own. The results come
+/// in the order of the items.
+fn in_parallel<T: Send, R: Send>(
+    items: Vec<T>,
+    work: impl Fn(T) -> anyhow::Result<R> + Sync,
+) -> anyhow::Result<Vec<R>> {
+    let threads = std::thread::available_parallelism().map_or(1, usize::from).min(items.len());
+    let items = Mutex::new(items.into_iter().enumerate());
+    let next = || items.lock().unwrap_or_else(PoisonError::into_inner).next();
+    let take_all = || std::iter::from_fn(next).map(|(at, item)| (at, work(item))).collect::<Vec<_>>();
+    let mut results: Vec<(usize, anyhow::Result<R>)> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..threads).map(|_| scope.spawn(take_all)).collect();
+        threads
+            .into_iter()
+            .flat_map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)))
+            .collect()
+    });
+    results.sort_by_key(|(at, _)| *at);
+    results.into_iter().map(|(_, result)| result).collect()
 }
 
 /// The plain one, each feature alone, all together: what conditions go wrong in most.

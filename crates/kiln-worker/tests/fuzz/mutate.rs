@@ -1,0 +1,289 @@
+//! Damage, small and monstrous.
+
+use std::fmt::Write as _;
+
+use crate::corpus::Input;
+use crate::random::Random;
+
+/// One to three changes to one file of `input`, most often its root. `others` lends text.
+pub fn mutate(input: &Input, others: &[Input], random: &mut Random) -> Input {
+    let mut mutant = Input { is_valid: false, ..input.clone() };
+    let paths: Vec<String> = mutant.files.keys().cloned().collect();
+    let path = match mutant.program.roots.iter().find(|root| mutant.files.contains_key(*root)) {
+        Some(root) if !random.one_in(4) => root.clone(),
+        _ => random.pick(&paths).clone(),
+    };
+    let mut text = mutant.files[&path].clone();
+    let is_wgsl = path.ends_with(".wgsl");
+    for _ in 0..1 + random.below(3) {
+        text = match random.below(9) {
+            0 => bytes(text, random),
+            1 | 2 => tokens(&text, random),
+            3 => splice(&text, random.pick(others), random),
+            4 => at_a_number(&text, &nested(random), random),
+            5 => at_a_number(&text, &chain(random), random),
+            6 => at_a_number(&text, NUMBERS[random.below(NUMBERS.len())], random),
+            7 => text + &bomb(is_wgsl, random),
+            _ => includes(text, is_wgsl, &mut mutant, random),
+        };
+    }
+    mutant.files.insert(path, text);
+    mutant
+}
+
+fn bytes(text: String, random: &mut Random) -> String {
+    let mut bytes = text.into_bytes();
+    for _ in 0..1 + random.below(8) {
+        let at = random.below(bytes.len() + 1);
+        match random.below(4) {
+            0 => bytes.truncate(at),
+            1 => bytes.insert(at, random.below(256) as u8),
+            2 if at < bytes.len() => drop(bytes.remove(at)),
+            _ => bytes.iter_mut().skip(at).take(1).for_each(|byte| *byte ^= 1 << random.below(8)),
+        }
+    }
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// Words, numbers and single characters.
+fn token_ranges(text: &str) -> Vec<std::ops::Range<usize>> {
+    let mut ranges: Vec<std::ops::Range<usize>> = Vec::new();
+    let mut in_word = false;
+    for (at, character) in text.char_indices() {
+        let is_word = character.is_alphanumeric() || character == '_';
+        let end = at + character.len_utf8();
+        match ranges.last_mut() {
+            Some(last) if is_word && in_word => last.end = end,
+            _ if !character.is_whitespace() => ranges.push(at..end),
+            _ => {}
+        }
+        in_word = is_word;
+    }
+    ranges
+}
+
+fn tokens(text: &str, random: &mut Random) -> String {
+    let ranges = token_ranges(text);
+    if ranges.is_empty() {
+        return text.to_owned();
+    }
+    let (one, other) = (random.pick(&ranges).clone(), random.pick(&ranges).clone());
+    let mut changed = text.to_owned();
+    let with = match random.below(4) {
+        0 => String::new(),
+        1 => format!("{} {}", &text[one.clone()], &text[other]),
+        2 => (*random.pick(&WORDS)).to_owned(),
+        _ => text[other].to_owned(),
+    };
+    changed.replace_range(one, &with);
+    changed
+}
+
+const WORDS: [&str; 30] = [
+    "{",
+    "}",
+    "(",
+    ")",
+    "[",
+    "]",
+    ";",
+    "#",
+    "##",
+    "\\\n",
+    "//",
+    "/*",
+    "f32",
+    "vec4f",
+    "struct",
+    "array",
+    "var",
+    "let",
+    "const",
+    "override",
+    "loop",
+    "switch",
+    "return",
+    "sampler2D",
+    "uniform",
+    "inout",
+    "layout",
+    "@if(a)",
+    "import",
+    "texture_2d",
+];
+
+/// Lines of another shader.
+fn splice(text: &str, other: &Input, random: &mut Random) -> String {
+    let files: Vec<&String> = other.files.values().collect();
+    let lent: Vec<&str> = random.pick(&files).lines().collect();
+    let mut lines: Vec<&str> = text.lines().collect();
+    let start = random.below(lent.len() + 1);
+    let end = (start + 1 + random.below(20)).min(lent.len());
+    let at = random.below(lines.len() + 1);
+    let gone = (at + random.below(5)).min(lines.len());
+    lines.splice(at..gone, lent[start.min(end)..end].iter().copied());
+    lines.join("\n")
+}
+
+/// Replaces one of the text's numbers.
+fn at_a_number(text: &str, with: &str, random: &mut Random) -> String {
+    let mut ranges = token_ranges(text);
+    ranges.retain(|range| text[range.clone()].starts_with(|first: char| first.is_ascii_digit()));
+    if ranges.is_empty() {
+        return format!("{text}\n{with}");
+    }
+    let mut changed = text.to_owned();
+    changed.replace_range(random.pick(&ranges).clone(), with);
+    changed
+}
+
+const NUMBERS: [&str; 14] = [
+    "0",
+    "-1",
+    "1e38",
+    "1e39",
+    "1e-50",
+    "4294967295u",
+    "4294967296",
+    "2147483647",
+    "-2147483648",
+    "65535",
+    "1000000",
+    "99999999999999999999",
+    "0x7fffffff",
+    "0x1p-1074",
+];
+
+fn length(random: &mut Random) -> usize {
+    // Within the limits, at their edge and far beyond.
+    *random.pick(&[10, 50, 95, 99, 100, 101, 190, 260, 400, 499, 501, 5_000, 50_000])
+}
+
+fn nested(random: &mut Random) -> String {
+    let (open, close) = *random.pick(&[
+        ("(", ")"),
+        ("sin(", ")"),
+        ("(1.0+", ")"),
+        ("-(", ")"),
+        ("vec2(", ",1.0).x"),
+        ("[", "]"),
+        ("{", "}"),
+    ]);
+    let count = length(random);
+    format!("{}1.0{}", open.repeat(count), close.repeat(count))
+}
+
+fn chain(random: &mut Random) -> String {
+    let link =
+        *random.pick(&["1.0+", "1+", "-", "!", "~", "1.0*", "true&&", "1<<", "1.0/", "true?1.0:", "*&"]);
+    format!("{}1", link.repeat(length(random)))
+}
+
+/// Declarations that ask for much, by themselves or by what each does to the one before.
+fn bomb(is_wgsl: bool, random: &mut Random) -> String {
+    let count = *random.pick(&[8, 20, 60, 300]);
+    let mut text = String::from("\n");
+    let kind = random.below(7);
+    if is_wgsl {
+        match kind {
+            0 => {
+                text += "var<private> huge: array<array<f32, 65535>, 65535>; @fragment fn fz() { huge[1][2] = 1.0; }"
+            }
+            1 => {
+                text += "const huge = array<f32, 10000000>(); @fragment fn fz() -> @location(0) vec4f { return vec4f(huge[3]); }"
+            }
+            2 => {
+                text += "alias B0 = f32;";
+                (0..count).for_each(|i| _ = write!(text, "alias B{} = array<B{i}, 2>;", i + 1));
+                _ = write!(text, "const bomb = B{count}();");
+            }
+            3 => {
+                text += "struct B0 { a: f32 }";
+                (0..count).for_each(|i| _ = write!(text, "struct B{} {{ a: B{i}, b: B{i} }}", i + 1));
+                _ = write!(
+                    text,
+                    "var<private> bomb: B{count}; @fragment fn fz() {{ var b = bomb; bomb = b; }}"
+                );
+            }
+            4 => {
+                text += "fn b0() -> f32 { return 1.0; }";
+                (0..count)
+                    .for_each(|i| _ = write!(text, "fn b{}() -> f32 {{ return b{i}() + b{i}(); }}", i + 1));
+                _ = write!(text, "@fragment fn fz() -> @location(0) vec4f {{ return vec4f(b{count}()); }}");
+            }
+            5 => {
+                text += "const b0 = vec4f(1.0);";
+                (0..count).for_each(|i| _ = write!(text, "const b{} = b{i} + b{i} * b{i};", i + 1));
+            }
+            _ => {
+                text += "@compute @workgroup_size(1) fn fz() {";
+                (0..count).for_each(|i| {
+                    _ = write!(
+                        text,
+                        "for (var i{i} = 0; i{i} < 2147483647; i{i}++) {{ switch i{i} {{ default {{}} }} }}"
+                    )
+                });
+                text += "}";
+            }
+        }
+    } else {
+        match kind {
+            0 => text += "float huge[2147483647];\n",
+            1 => {
+                (0..count).for_each(|i| _ = writeln!(text, "#define B{i} B{} B{}", i + 1, i + 1));
+                text += "float bomb = B0;\n";
+            }
+            2 => {
+                (0..count).for_each(|i| _ = writeln!(text, "#define B{i}(x) B{}(x x) B{}(x)", i + 1, i + 1));
+                text += "float bomb = B0(1.0);\n";
+            }
+            3 => {
+                text += "struct B0 { float a; };\n";
+                (0..count).for_each(|i| _ = writeln!(text, "struct B{} {{ B{i} a; B{i} b[9]; }};", i + 1));
+                _ = writeln!(text, "uniform Bomb {{ B{count} bomb; }};");
+            }
+            4 => {
+                text += "float b0() { return 1.0; }\n";
+                (0..count)
+                    .for_each(|i| _ = writeln!(text, "float b{}() {{ return b{i}() + b{i}(); }}", i + 1));
+            }
+            5 => {
+                text += "#if 1\n";
+                text += &"#if 1\n#elif 1\n".repeat(count);
+            }
+            _ => {
+                text += "void fz() {";
+                (0..count).for_each(|i| _ = write!(text, "for (int i{i} = 0; i{i} < 2147483647; i{i}++) ;"));
+                text += "}\n";
+            }
+        }
+    }
+    text
+}
+
+/// Files that include each other: in a circle, doubling, or many.
+fn includes(text: String, is_wgsl: bool, mutant: &mut Input, random: &mut Random) -> String {
+    let count = *random.pick(&[2, 30, 70, 300]);
+    let times = 1 + random.below(3);
+    let is_circle = random.one_in(2);
+    for index in 0..count {
+        let next = if is_circle { (index + 1) % count } else { index + 1 };
+        let (path, content) = if is_wgsl {
+            let import = format!("import lib::fz{next}::f{next};\n").repeat(times);
+            (
+                format!("shaders/lib/fz{index}.wgsl"),
+                format!("{import}fn f{index}() -> f32 {{ return f{next}(); }}\n"),
+            )
+        } else {
+            (format!("fz{index}.glsl"), format!("#include \"fz{next}.glsl\"\n").repeat(times))
+        };
+        mutant.files.insert(path, content);
+    }
+    if is_wgsl {
+        return format!(
+            "import lib::fz0::f0;\n{text}\n@fragment fn fz() -> @location(0) vec4f {{ return vec4f(f0()); }}"
+        );
+    }
+    let (first, rest) = text.split_once('\n').unwrap_or((&text, ""));
+    format!("{first}\n#include \"fz0.glsl\"\n{rest}")
+}
