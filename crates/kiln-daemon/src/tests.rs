@@ -55,7 +55,7 @@ fn events_close_together_are_one_batch() {
     drop(sender);
     let batches = Mutex::new(Vec::new());
     let name = |name: &&str| if name.is_empty() { BTreeSet::new() } else { names(&[name]) };
-    settle(&events, &|batch: Batch| batches.lock().unwrap().push(batch.files), name);
+    settle(&events, &|batch: Batch| batches.lock().unwrap().push(batch.files), name, |_| false);
     assert_eq!(batches.into_inner().unwrap(), [names(&["a", "b"])]);
 }
 
@@ -116,4 +116,15 @@ fn file_of_two_names_changes_under_both() {
     assert_eq!(watch.with_other_names(vec!["three.wgsl".to_owned()]), ["three.wgsl"]);
     fs::write(project.join("one.wgsl"), "after").unwrap();
     assert_eq!(batches.recv_timeout(LIMIT).unwrap().files, both);
+}
+
+#[test]
+fn closed_or_moved_file_is_whole_and_a_written_one_is_not() {
+    use notify::event::{AccessKind, AccessMode, DataChange, ModifyKind, RenameMode};
+    let event = |kind| Ok(notify::Event::new(kind));
+    let ends = |kind| crate::watch::ends_a_save(&event(kind));
+    assert!(ends(notify::EventKind::Access(AccessKind::Close(AccessMode::Write))));
+    assert!(ends(notify::EventKind::Modify(ModifyKind::Name(RenameMode::To))));
+    assert!(!ends(notify::EventKind::Modify(ModifyKind::Data(DataChange::Any))));
+    assert!(!ends(notify::EventKind::Access(AccessKind::Close(AccessMode::Read))));
 }

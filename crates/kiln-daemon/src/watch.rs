@@ -10,6 +10,8 @@ use notify::{EventKind, RecommendedWatcher, RecursiveMode, Watcher as _};
 
 /// A batch ends when nothing has happened for this long …
 const QUIET: Duration = Duration::from_millis(15);
+/// The same where one file was saved and closed: only an editor that touches it once more is waited for.
+const QUIET_AFTER_SAVE: Duration = Duration::from_millis(2);
 /// … or when it has gone on for this long.
 const BATCH_MAX: Duration = Duration::from_millis(500);
 
@@ -64,7 +66,8 @@ impl Watch {
         let relevant = Arc::new(Mutex::new(BTreeMap::new()));
         let (folder_of_thread, relevant_of_thread) = (folder.to_owned(), relevant.clone());
         std::thread::spawn(move || {
-            settle(&events, &settled, |event| name_changes(event, &folder_of_thread, &relevant_of_thread));
+            let name = |event: &_| name_changes(event, &folder_of_thread, &relevant_of_thread);
+            settle(&events, &settled, name, ends_a_save);
         });
         Ok(Watch { watcher, folder: folder.to_owned(), relevant, outside: BTreeSet::new(), has_links: false })
     }
@@ -166,11 +169,24 @@ pub(crate) fn name_changes(
     names
 }
 
-/// Collects events into batches until the sending side is gone.
+/// Whether a file is whole with this event: whoever wrote it closed it, or moved it to its place.
+pub(crate) fn ends_a_save(event: &notify::Result<notify::Event>) -> bool {
+    use notify::event::{AccessKind, AccessMode, ModifyKind, RenameMode};
+    event.as_ref().is_ok_and(|event| {
+        matches!(
+            event.kind,
+            EventKind::Access(AccessKind::Close(AccessMode::Write))
+                | EventKind::Modify(ModifyKind::Name(RenameMode::To | RenameMode::Both))
+        )
+    })
+}
+
+/// Collects events into batches until the sending side is gone. `ends_save` tells events after which one file is whole.
 pub(crate) fn settle<E>(
     events: &Receiver<E>,
     settled: &impl Fn(Batch),
     name: impl Fn(&E) -> BTreeSet<String>,
+    ends_save: impl Fn(&E) -> bool,
 ) {
     while let Ok(event) = events.recv() {
         let mut files = name(&event);
@@ -179,9 +195,17 @@ pub(crate) fn settle<E>(
         }
         let noticed_unix_ms = unix_ms(SystemTime::now());
         let begun = Instant::now();
+        let quiet = |files: &BTreeSet<String>, event: &E| match files.len() {
+            1 if ends_save(event) => QUIET_AFTER_SAVE,
+            _ => QUIET,
+        };
+        let mut wait = quiet(&files, &event);
         while begun.elapsed() < BATCH_MAX {
-            match events.recv_timeout(QUIET) {
-                Ok(event) => files.extend(name(&event)),
+            match events.recv_timeout(wait) {
+                Ok(event) => {
+                    files.extend(name(&event));
+                    wait = quiet(&files, &event);
+                }
                 Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => break,
             }
         }

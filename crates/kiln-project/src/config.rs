@@ -1,6 +1,7 @@
 //! kiln.toml as data.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 use kiln_diagnostic::Diagnostic;
 use kiln_shader::{Language, Program};
@@ -295,30 +296,38 @@ fn read_shader(section: &mut Section, name: &str) -> ShaderConfig {
         |texts: Option<Vec<String>>| texts.unwrap_or_default().iter().map(|path| normalised(path)).collect();
     let program = Program {
         roots,
-        defines: section
-            .texts("defines")
-            .unwrap_or_default()
-            .iter()
-            .map(|define| read_define(define))
-            .collect(),
+        defines: read_each(section, "defines", parse_define),
         include_dirs: paths(section.texts("include")),
         prelude: paths(section.texts("prelude")),
     };
     check_program(section, &program);
-    let variants = section.texts("variants").unwrap_or_default();
+    check_inside(section, "source", &program.roots);
+    check_inside(section, "include", &program.include_dirs);
+    check_inside(section, "prelude", &program.prelude);
+    let variants = read_each(section, "variants", parse_variant);
     ShaderConfig {
         program,
         role: section.choice("role", &roles).unwrap_or(by_name),
-        variants: variants.iter().map(|variant| parse_variant(variant)).collect(),
+        variants: variants.into_iter().collect(),
         emit: read_languages(section),
         textures: read_textures(section),
     }
 }
 
-/// `NAME=VALUE`, or `NAME` for 1, as compilers take it.
-fn read_define(text: &str) -> (String, String) {
-    let (name, value) = text.split_once('=').unwrap_or((text, "1"));
-    (name.trim().to_owned(), value.trim().to_owned())
+/// Reads each text of a list; those that are wrong are said.
+fn read_each<T>(
+    section: &mut Section,
+    key: &'static str,
+    read: impl Fn(&str) -> Result<T, String>,
+) -> Vec<T> {
+    let mut values = Vec::new();
+    for text in section.texts(key).unwrap_or_default() {
+        match read(&text) {
+            Ok(value) => values.push(value),
+            Err(message) => section.fail(message, section.place(key), None),
+        }
+    }
+    values
 }
 
 /// `textures = ["noise=textures/noise.png", "ramp=textures/ramp.png srgb"]`.
@@ -343,6 +352,8 @@ fn read_textures(section: &mut Section) -> BTreeMap<String, OwnTexture> {
             }
         }
     }
+    let sources: Vec<String> = textures.values().map(|texture: &OwnTexture| texture.source.clone()).collect();
+    check_inside(section, "textures", &sources);
     textures
 }
 
@@ -363,6 +374,10 @@ fn read_languages(section: &mut Section) -> BTreeSet<Language> {
 }
 
 fn check_program(section: &mut Section, program: &Program) {
+    if program.roots.is_empty() {
+        let help = "name a WGSL file, or a GLSL file for each stage".to_owned();
+        section.fail("`source` names no file".to_owned(), section.place("source"), Some(help));
+    }
     let is_wgsl = program.subject().ends_with(".wgsl");
     if program.roots.len() > 1 && program.roots.iter().any(|root| root.ends_with(".wgsl")) {
         let help = "a WGSL shader has one root module, which imports the others";
@@ -390,7 +405,50 @@ pub fn variant_name(features: &BTreeSet<String>) -> String {
 }
 
 /// The feature set of a name.
-pub fn parse_variant(name: &str) -> BTreeSet<String> {
+///
+/// # Errors
+/// A feature that is no identifier: targets, and so files, are named after it.
+pub fn parse_variant(name: &str) -> Result<BTreeSet<String>, String> {
     let features = name.split('+').map(str::trim).filter(|feature| !["", "base"].contains(feature));
-    features.map(str::to_owned).collect()
+    features
+        .map(|feature| match is_identifier(feature) {
+            true => Ok(feature.to_owned()),
+            false => Err(format!("`{feature}` is no feature: they are words of letters, digits and `_`")),
+        })
+        .collect()
+}
+
+/// A macro as compilers take it: `NAME=VALUE`, or `NAME` for 1.
+///
+/// # Errors
+/// The name is no identifier, or the value has more than one line.
+pub fn parse_define(text: &str) -> Result<(String, String), String> {
+    let (name, value) = text.split_once('=').unwrap_or((text, "1"));
+    let (name, value) = (name.trim(), value.trim());
+    if !is_identifier(name) || name.starts_with("gl_") || name.starts_with("__") {
+        return Err(format!("`{name}` is no name of a macro"));
+    }
+    if value.contains(['\n', '\r']) {
+        return Err(format!("the value of `{name}` has more than one line"));
+    }
+    Ok((name.to_owned(), value.to_owned()))
+}
+
+fn is_identifier(name: &str) -> bool {
+    let fits = |character: char| character.is_ascii_alphanumeric() || character == '_';
+    name.len() <= 80
+        && name.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_')
+        && name.chars().all(fits)
+}
+
+/// What leaves the project is refused: what is read may be shown.
+fn check_inside(section: &mut Section, key: &'static str, paths: &[String]) {
+    for path in paths {
+        let leaves = Path::new(path).is_absolute() || path.split('/').any(|part| part == "..");
+        if leaves {
+            let help = "copy or link it into the project's folder";
+            let message = format!("`{path}` in `{key}` lies outside the project");
+            section.fail(message, section.place(key), Some(help.to_owned()));
+        }
+    }
 }

@@ -14,7 +14,8 @@ pub use export::{CONVENTIONS_FILE, ExportFailure, Exported, export, wished};
 // The limits of an environment are those of its recipe.
 pub use check::{Difference, DifferenceKind, differences};
 pub use config::{
-    OwnTexture, Project, Role, SceneConfig, ShaderConfig, parse_project, parse_variant, variant_name,
+    OwnTexture, Project, Role, SceneConfig, ShaderConfig, parse_define, parse_project, parse_variant,
+    variant_name,
 };
 pub use env_config::{EnvConfig, FORMATS, Range, format_name};
 pub use kiln_bake::{BAND_LIMIT_MAX, RoughnessLaw, TexelFormat, decode_level, panorama_of_cube};

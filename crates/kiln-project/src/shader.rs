@@ -60,7 +60,8 @@ pub(crate) fn plan_shader(
     let srgb: Vec<&String> =
         config.textures.iter().filter(|(_, texture)| texture.is_srgb).map(|(name, _)| name).collect();
     let mut compiled: BTreeMap<BTreeSet<String>, ActionId> = BTreeMap::new();
-    for features in variants.of(name, config) {
+    for asked in variants.of(name, config) {
+        let features = asked.clone();
         let variant = variant_name(&features);
         if let Some(unknown) =
             config.variants.contains(&features).then(|| features.difference(&known).next()).flatten()
@@ -84,8 +85,7 @@ pub(crate) fn plan_shader(
                 vec![PartSpec::Folder(emit, FILES)],
             );
         }
-        let mut meta =
-            json!({"shader": name, "role": config.role.name(), "features": crate::parse_variant(&variant)});
+        let mut meta = json!({"shader": name, "role": config.role.name(), "features": asked});
         if !srgb.is_empty() {
             meta["srgb_textures"] = json!(srgb);
         }
@@ -166,12 +166,12 @@ fn file_name(suffix: &str) -> String {
     format!("{FILES}/{}", suffix.trim_start_matches('.'))
 }
 
-/// A worker's death is the input's fault; that there is none is not.
+/// What a worker died of is the input's fault, and kept as such; that there is none, or that somebody killed it, is not.
 fn death(died: Died, subject: &str) -> Result<ActionOutput, Error> {
-    match died {
-        Died::NoWorker(reason) => Err(Error::Action { action: "compile".to_owned(), reason }),
-        Died::TooSlow(_) | Died::Crashed(_) => Ok(failure(died.diagnostic(subject))),
+    if died.is_of_input() {
+        return Ok(failure(died.diagnostic(subject)));
     }
+    Err(Error::Action { action: format!("compile {subject}"), reason: died.diagnostic(subject).message })
 }
 
 fn unknown_feature(shader: &str, variant: &str, feature: &str, known: &BTreeSet<String>) -> Diagnostic {

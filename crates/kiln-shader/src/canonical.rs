@@ -263,9 +263,12 @@ fn is_plain_name(text: &str, tokens: &[Token], index: usize) -> bool {
     let before = |count: usize| index.checked_sub(count).map(|index| &tokens[index]);
     let is_component = before(1).is_some_and(|token| token.is('.'));
     let is_attribute = before(1).is_some_and(|token| token.is('@'));
-    let in_builtin = before(1).is_some_and(|token| token.is('('))
-        && before(2)
-            .is_some_and(|token| ["builtin", "interpolate"].iter().any(|word| token.is_word(text, word)))
-        && before(3).is_some_and(|token| token.is('@'));
+    // As in `@builtin(position)` and `@interpolate(perspective, centroid)`.
+    let inside = |token: &Token| token.kind == Kind::Word || token.is(',');
+    let open = (0..index).rev().find(|&at| !inside(&tokens[at]));
+    let in_builtin = open.filter(|&at| tokens[at].is('(') && at >= 2).is_some_and(|at| {
+        ["builtin", "interpolate"].iter().any(|word| tokens[at - 1].is_word(text, word))
+            && tokens[at - 2].is('@')
+    });
     !(is_component || is_attribute || in_builtin)
 }

@@ -1,6 +1,6 @@
 //! Turns naga's errors into diagnostics at their author's file and line.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use kiln_diagnostic::{Diagnostic, Span};
@@ -15,23 +15,60 @@ use crate::{limits, suggest};
 /// Explains `fault` of the linked text, and what else is wrong: the first fault of every module, since naga stops at its
 /// first.
 pub fn all(graph: &Graph, linked: &Linked, fault: Fault) -> Vec<Diagnostic> {
-    let Fault::Source(_) = fault else { return vec![diagnostic(graph, linked, fault)] };
-    let mut faults: BTreeMap<usize, Diagnostic> = BTreeMap::new();
-    for &index in &graph.order {
-        let is_whole = graph.imports_of(index).iter().all(|module| !faults.contains_key(module));
-        let sound = |module: &&usize| **module == index || !faults.contains_key(*module);
-        let imported: Vec<usize> = graph.imports_of(index).iter().filter(sound).copied().collect();
-        let order: Vec<usize> = imported.into_iter().chain([index]).collect();
-        let linked = Linked::join(graph, &order);
-        let Err(Fault::Source(finding)) = front::check_linked(&linked.text) else { continue };
+    let (Fault::Source(_), Some(&root)) = (&fault, graph.order.last()) else {
+        return vec![diagnostic(graph, linked, fault)];
+    };
+    let mut search = Search { graph, sound: BTreeSet::new(), seen: BTreeSet::new(), faults: BTreeMap::new() };
+    search.look_into(root);
+    if search.faults.is_empty() {
+        return vec![diagnostic(graph, linked, fault)];
+    }
+    search.faults.into_values().collect()
+}
+
+/// Looks for the first fault of each module, from the root to what it imports: what checks together is sound.
+struct Search<'a> {
+    graph: &'a Graph,
+    sound: BTreeSet<usize>,
+    seen: BTreeSet<usize>,
+    faults: BTreeMap<usize, Diagnostic>,
+}
+
+impl Search<'_> {
+    /// How deep modules are nested is bounded by their number.
+    fn look_into(&mut self, index: usize) {
+        if self.sound.contains(&index) || !self.seen.insert(index) {
+            return;
+        }
+        let imports = self.graph.imports_of(index);
+        let whole: Vec<usize> = imports.iter().copied().chain([index]).collect();
+        let mut finding = match self.check(&whole) {
+            None => return self.sound.extend(whole),
+            Some(finding) => finding,
+        };
+        imports.iter().rev().for_each(|import| self.look_into(*import));
+        let usable: Vec<usize> =
+            whole.iter().copied().filter(|module| !self.faults.contains_key(module)).collect();
+        let is_whole = usable.len() == whole.len();
+        if !is_whole {
+            let Some(own) = self.check(&usable) else { return };
+            finding = own;
+        }
+        let linked = Linked::join(self.graph, &usable);
         let place = finding.labels.first().and_then(|(range, _)| linked.origin(range.clone()));
         // What a broken module would have declared is missing, which is no fault of this one.
         let is_own = is_whole || !finding.message.starts_with("no definition in scope");
         if place.is_some_and(|(module, _)| module == index) && is_own {
-            faults.insert(index, diagnostic(graph, &linked, Fault::Source(finding)));
+            self.faults.insert(index, diagnostic(self.graph, &linked, Fault::Source(finding)));
         }
     }
-    if faults.is_empty() { vec![diagnostic(graph, linked, fault)] } else { faults.into_values().collect() }
+
+    fn check(&self, modules: &[usize]) -> Option<Finding> {
+        match front::check_linked(&Linked::join(self.graph, modules).text) {
+            Err(Fault::Source(finding)) => Some(finding),
+            _ => None,
+        }
+    }
 }
 
 /// Explains `fault` of the linked text.

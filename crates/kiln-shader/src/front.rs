@@ -143,7 +143,9 @@ fn reparse_fault(error: &ParseError, wgsl: &str) -> Fault {
 /// Validates as a wgpu device without optional features does.
 pub fn validate(module: &Module) -> Result<ModuleInfo, Box<WithSpan<ValidationError>>> {
     // naga's default capabilities are those of a wgpu device without optional features.
-    Validator::new(ValidationFlags::all(), Capabilities::default()).validate(module).map_err(Box::new)
+    // Packing halves is no optional feature of WGSL, and devices without it are older than wgpu asks for by default.
+    let capabilities = Capabilities::default() | Capabilities::SHADER_FLOAT16_IN_FLOAT32;
+    Validator::new(ValidationFlags::all(), capabilities).validate(module).map_err(Box::new)
 }
 
 fn parse_finding(error: &ParseError) -> Finding {

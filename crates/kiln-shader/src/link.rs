@@ -259,7 +259,13 @@ impl Loader<'_, '_> {
 
     /// Finds and loads what `import` of module `importer` names: a module that has the items, or modules called like them.
     fn import(&mut self, importer: usize, import: &Import) {
-        match self.find(importer, &import.path, &import.path_range) {
+        // `import super::k` names no module but the folder of one.
+        let is_folder = import.path.iter().all(|part| ["super", "package"].contains(&part.as_str()));
+        let found = match is_folder {
+            true => Found::Nowhere(Vec::new()),
+            false => self.find(importer, &import.path, &import.path_range),
+        };
+        match found {
             Found::Module(target) => {
                 for item in &import.items {
                     let (local, meaning) = (item.local(), (target, item.name.name.clone()));

@@ -84,6 +84,7 @@ pub fn outline(file: &str, text: &str, tokens: &[Token], diagnostics: &mut Vec<D
     let mut outline = Outline::default();
     let mut declared_before = false;
     while parser.at < tokens.len() {
+        let first = parser.at;
         let is_entry_point = parser.skip_attributes();
         let start = parser.at;
         match parser.word() {
@@ -108,7 +109,7 @@ pub fn outline(file: &str, text: &str, tokens: &[Token], diagnostics: &mut Vec<D
                 let declared = parser.declared_name(keyword);
                 outline.declarations.extend(declared.map(|name| Declaration { name, is_public }));
                 parser.skip_declaration();
-                parser.collect_qualified(start, &mut outline.qualified);
+                parser.collect_qualified(first, &mut outline.qualified);
             }
             None => parser.at += 1,
         }

@@ -85,6 +85,15 @@ fn captured(graph: &Graph, faults: &mut Vec<Diagnostic>) -> BTreeSet<Declared> {
         let aliases = module.names.iter().filter(|(local, (_, name))| *local != name);
         let targets = aliases.map(|(_, target)| target).chain(module.paths.iter().map(|(_, target)| target));
         for (target, name) in targets.filter(|(_, name)| words.contains_key(name.as_str())) {
+            if module.names.get(name) == Some(&(*target, name.clone())) {
+                // The plain word means the same here, unless a local has it.
+                if let Some(local) = local_declaration(module, name) {
+                    let message = format!("`{name}` is a local here, and is imported under another name too");
+                    let help = "its plain name would be taken for the local: rename that";
+                    faults.push(graph.error_at(index, local, message).with_help(help));
+                }
+                continue;
+            }
             let declared = graph.modules[*target].outline.declarations.iter();
             if declared.into_iter().any(|declaration| declaration.name.name == *name && declaration.is_public)
             {
@@ -111,6 +120,20 @@ fn own_words(module: &Module) -> BTreeMap<&str, Range<usize>> {
         }
     }
     words
+}
+
+/// Where `name` is declared inside a function: behind `let`, `var` or `const`, or before the `:` of a parameter.
+fn local_declaration(module: &Module, name: &str) -> Option<Range<usize>> {
+    let (text, tokens) = (&*module.text, tokens(module));
+    let members = member_declarations(text, &tokens);
+    let is_declared = |at: usize| {
+        let before = at.checked_sub(1).map(|at| &tokens[at]);
+        let is_word = |token: &&Token| ["let", "var", "const"].iter().any(|word| token.is_word(text, word));
+        before.is_some_and(|token| is_word(&token) || token.is('>'))
+            || (tokens.get(at + 1).is_some_and(|next| next.is(':')) && !members.contains(&at))
+    };
+    let here = |at: &usize| tokens[*at].is_word(text, name) && is_declared(*at);
+    (0..tokens.len()).find(here).map(|at| tokens[at].range())
 }
 
 fn contains(range: &Range<usize>, token: &Token) -> bool {

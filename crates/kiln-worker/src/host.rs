@@ -29,8 +29,12 @@ impl Limits {
 /// Why a child could not do a task.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Died {
-    /// It took longer than this and was ended.
+    /// It took more CPU time than this and was ended.
     TooSlow(Duration),
+    /// It did not answer for this long on the clock, and was ended: a fault of the compiler, or a machine too busy.
+    Stuck(Duration),
+    /// Somebody killed it: a person, or a system short of memory.
+    Killed,
     /// It ended by itself: out of stack or of memory, or by a fault of the compiler.
     Crashed(String),
     /// No child could be started, or it does not speak this protocol.
@@ -38,12 +42,25 @@ pub enum Died {
 }
 
 impl Died {
+    /// Whether the same input will have it die again.
+    pub fn is_of_input(&self) -> bool {
+        matches!(self, Died::TooSlow(_) | Died::Crashed(_))
+    }
+
     /// As a message about the shader `file`; empty if the caller adds it.
     pub fn diagnostic(&self, file: &str) -> Diagnostic {
         let (message, help) = match self {
             Died::TooSlow(limit) => (
                 format!("the shader compiler was ended after {} s of work on this", limit.as_secs_f64()),
                 "undo the last edit, or split the shader: something in it takes the compiler for ever",
+            ),
+            Died::Stuck(limit) => (
+                format!("the shader compiler did not answer within {} s", limit.as_secs_f64()),
+                "try again when the machine is less busy",
+            ),
+            Died::Killed => (
+                "the shader compiler was killed by somebody else".to_owned(),
+                "try again; see whether the system is short of memory",
             ),
             Died::Crashed(how) => (
                 format!("the shader compiler {how} on this"),
@@ -108,14 +125,17 @@ impl Workers {
             match self.run_on(worker, task) {
                 // It may have died before, of something else: killed by a person, or by a system short of memory. So may
                 // the others.
-                Err(Died::Crashed(_)) => {
+                Err(Died::Crashed(_) | Died::Killed) => {
                     self.idle().retain_mut(|worker| matches!(worker.child.try_wait(), Ok(None)));
                 }
                 result => return result,
             }
         }
-        let worker = self.start().map_err(|error| Died::NoWorker(error.to_string()))?;
-        self.run_on(worker, task)
+        let start = || self.start().map_err(|error| Died::NoWorker(error.to_string()));
+        match self.run_on(start()?, task) {
+            Err(Died::Killed) => self.run_on(start()?, task),
+            result => result,
+        }
     }
 
     fn run_on(&self, mut worker: Worker, task: &Task) -> Result<Reply, Died> {
@@ -173,16 +193,18 @@ impl Worker {
                 return Err(Died::TooSlow(limits.cpu));
             }
             if start.elapsed() > limits.wall {
-                return Err(Died::TooSlow(limits.wall));
+                return Err(Died::Stuck(limits.wall));
             }
         }
     }
 
     /// How the child ended.
     fn died(&mut self) -> Died {
-        // It closed its output: it has ended or is about to.
-        let _ = self.child.kill();
-        Died::Crashed(self.child.wait().map_or_else(|_| "ended".to_owned(), describe))
+        // It closed its output: it has ended or is about to, but not by us.
+        match self.child.wait() {
+            Ok(status) => describe(status),
+            Err(_) => Died::Crashed("ended".to_owned()),
+        }
     }
 }
 
@@ -195,24 +217,24 @@ impl Drop for Worker {
 }
 
 #[cfg(unix)]
-fn describe(status: ExitStatus) -> String {
+fn describe(status: ExitStatus) -> Died {
     use std::os::unix::process::ExitStatusExt as _;
     match status.signal() {
-        Some(6) => "ran out of memory or stack and gave up".to_owned(),
-        Some(9) => "was killed".to_owned(),
-        Some(11) => "ran out of stack".to_owned(),
-        Some(signal) => format!("died of signal {signal}"),
+        Some(6) => Died::Crashed("ran out of memory or stack and gave up".to_owned()),
+        Some(9) => Died::Killed,
+        Some(11) => Died::Crashed("ran out of stack".to_owned()),
+        Some(signal) => Died::Crashed(format!("died of signal {signal}")),
         None => describe_exit(status),
     }
 }
 
 #[cfg(not(unix))]
-fn describe(status: ExitStatus) -> String {
+fn describe(status: ExitStatus) -> Died {
     describe_exit(status)
 }
 
-fn describe_exit(status: ExitStatus) -> String {
-    format!("ended early ({status})")
+fn describe_exit(status: ExitStatus) -> Died {
+    Died::Crashed(format!("ended early ({status})"))
 }
 
 /// CPU time that a process has used, from /proc (`man 5 proc`: fields 14 and 15 of stat, in hundredths of a second).

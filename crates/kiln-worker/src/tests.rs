@@ -30,7 +30,7 @@ fn child_that_works_for_ever_is_ended_by_its_cpu_time() {
 #[test]
 fn child_that_waits_for_ever_is_ended_by_the_clock() {
     let limits = Limits { wall: Duration::from_millis(200), ..SHORT };
-    assert_eq!(died("sleep 1000", limits), Died::TooSlow(limits.wall));
+    assert_eq!(died("sleep 1000", limits), Died::Stuck(limits.wall));
 }
 
 #[cfg(unix)]
@@ -41,6 +41,8 @@ fn child_that_crashes_is_said_how() {
         died("kill -ABRT $$", SHORT),
         Died::Crashed("ran out of memory or stack and gave up".to_owned())
     );
+    assert_eq!(died("kill -KILL $$", SHORT), Died::Killed);
+    assert!(!Died::Killed.is_of_input() && Died::TooSlow(SHORT.cpu).is_of_input());
     let Died::Crashed(how) = died("exit 3", SHORT) else { panic!("it ended") };
     assert!(how.starts_with("ended early"), "{how}");
 }

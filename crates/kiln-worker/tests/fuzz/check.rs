@@ -246,6 +246,8 @@ pub fn folder() -> PathBuf {
 fn kind(died: &Died) -> String {
     match died {
         Died::TooSlow(limit) => format!("ended after {limit:?}"),
+        Died::Stuck(limit) => format!("no answer for {limit:?}"),
+        Died::Killed => "killed".to_owned(),
         Died::Crashed(how) => how.clone(),
         Died::NoWorker(why) => format!("no worker: {why}"),
     }

@@ -44,8 +44,11 @@ pub(super) fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     } else {
         report::print_diagnostics(&diagnostics, true);
         let (files, variants) = (report::count(subjects.len(), "shader"), report::count(all, "variant"));
-        let verdict =
-            if good == all { "all compile".to_owned() } else { format!("{} do not compile", all - good) };
+        let verdict = if good == all {
+            "all compile".to_owned()
+        } else {
+            format!("{} of them {} not compile", all - good, if all - good == 1 { "does" } else { "do" })
+        };
         say!("{files}, {variants}: {verdict}; {}", report::duration(ms));
     }
     Ok(if is_bad { ExitCode::from(INPUT_IS_WRONG) } else { ExitCode::SUCCESS })

@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use kiln_shader::{BindingKind, Reflection, Stage};
+use kiln_shader::{BindingKind, Parameter, ParameterPlace, Reflection, Stage, Widget};
 use serde_json::{Value, json};
 
 use super::exit_code;
@@ -65,6 +65,27 @@ fn lines(reflection: &Reflection) -> Vec<String> {
             };
             lines.extend(members.iter().map(member));
         }
+    }
+    for constant in &reflection.overrides {
+        let default = constant.default.map_or_else(String::new, |value| format!(" = {value}"));
+        lines.push(format!("override {}: {}{default}", constant.name, constant.ty));
+    }
+    for parameter in &reflection.parameters {
+        let place = match &parameter.place {
+            ParameterPlace::Override => "override".to_owned(),
+            ParameterPlace::Member { uniform } => format!("member of {uniform}"),
+        };
+        let widget = match &parameter.widget {
+            Widget::Slider { least, greatest } => format!("slider from {least} to {greatest}"),
+            Widget::Color => "color".to_owned(),
+            Widget::Toggle => "toggle".to_owned(),
+            Widget::Choice { names } => format!("choice of {}", names.join(", ")),
+        };
+        let Parameter { name, default, label, .. } = parameter;
+        let first = default.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
+        lines.push(
+            format!("parameter {name} ({place}): {widget}, first {first}  {label}").trim_end().to_owned(),
+        );
     }
     lines
 }

@@ -41,7 +41,8 @@ pub(super) struct Variant {
 /// The shaders that a command line names. What is wrong with the projects among them comes too.
 pub(super) fn subjects(args: &SubjectArgs) -> anyhow::Result<(Vec<Subject>, Vec<Diagnostic>)> {
     let (mut subjects, mut diagnostics) = (Vec::new(), Vec::new());
-    let variants: BTreeSet<_> = args.variants.iter().map(|name| kiln_project::parse_variant(name)).collect();
+    let variant = |name: &String| kiln_project::parse_variant(name).map_err(WrongInput);
+    let variants: BTreeSet<_> = args.variants.iter().map(variant).collect::<Result<_, _>>()?;
     let mut programs: BTreeMap<(PathBuf, String), Vec<PathBuf>> = BTreeMap::new();
     for path in &args.files {
         if path.is_dir() {
@@ -96,7 +97,8 @@ fn of_files(
     files.dedup();
     let base = base_of(&files[0])?;
     let relative = |path: &Path| -> anyhow::Result<String> {
-        let path = path.canonicalize().with_context(|| format!("finding {}", path.display()))?;
+        let missing = |error| WrongInput(format!("{} cannot be read: {error}", path.display()));
+        let path = path.canonicalize().map_err(missing)?;
         let inside = path.strip_prefix(&base).ok().map(|path| path.to_string_lossy().replace('\\', "/"));
         inside.ok_or_else(|| {
             let message = format!(
@@ -110,13 +112,10 @@ fn of_files(
     let all = |paths: &[PathBuf]| -> anyhow::Result<Vec<String>> {
         paths.iter().map(|path| relative(path)).collect()
     };
-    let define = |text: &String| {
-        let (name, value) = text.split_once('=').unwrap_or((text, "1"));
-        (name.to_owned(), value.to_owned())
-    };
+    let define = |text: &String| kiln_project::parse_define(text).map_err(WrongInput);
     let program = Program {
         roots: all(&files)?,
-        defines: args.defines.iter().map(define).collect(),
+        defines: args.defines.iter().map(define).collect::<Result<_, _>>()?,
         include_dirs: all(&args.include_dirs)?,
         prelude: all(&args.prelude)?,
     };
@@ -147,7 +146,7 @@ fn of_project(
     for (name, config) in shaders {
         let prefix = format!("shader/{name}/");
         let names = plan.targets.iter().filter_map(|target| target.name.strip_prefix(&prefix));
-        let planned: BTreeSet<_> = names.map(kiln_project::parse_variant).collect();
+        let planned: BTreeSet<_> = names.filter_map(|name| kiln_project::parse_variant(name).ok()).collect();
         let asked = if variants.is_empty() { planned } else { variants.clone() };
         subjects.push(Subject::new(name.clone(), engine.folder().to_owned(), config.program.clone(), asked));
     }
