@@ -419,10 +419,11 @@ impl Writer<'_> {
         if let Some(place) = self.variable(ty).filter(|_| depth == 0 || self.random.one_in(3)) {
             return place;
         }
-        if depth > 0 && self.random.one_in(6) {
-            if let Some(call) = self.call(ty, depth) {
-                return call;
-            }
+        if depth > 0
+            && self.random.one_in(6)
+            && let Some(call) = self.call(ty, depth)
+        {
+            return call;
         }
         if depth > 0 && self.random.one_in(8) {
             return self.choice(ty, depth);
