@@ -40,6 +40,8 @@ pub struct Report {
     pub valid_compiled: usize,
     /// Programs whose canonical text becomes a fixed point after some rounds only.
     pub settled_late: usize,
+    /// Programs whose canonical text nests deeper than sources may.
+    pub too_deep: usize,
     /// By how the worker ended, the seeds.
     pub deaths: BTreeMap<String, Vec<u64>>,
     /// Texts in a language, and refusals by it.
@@ -122,6 +124,11 @@ impl Checker {
                         self.find(seed, format!("canonical text changes: {difference}"));
                     }
                     text = again.wgsl;
+                }
+                // The limits are on what people write; naga's writer puts parentheses around every operation.
+                Some(Reply::Compiled(outcome)) if is_too_deep(&outcome) => {
+                    self.report.too_deep += 1;
+                    break;
                 }
                 Some(Reply::Compiled(outcome)) => {
                     self.find(seed, format!("canonical text is refused: {:?}", outcome.diagnostics));
@@ -212,11 +219,11 @@ impl Report {
         for (kind, seeds) in &self.deaths {
             _ = writeln!(text, "  {kind}: {} (seeds {:?})", seeds.len(), &seeds[..seeds.len().min(8)]);
         }
-        let at_once = compiled - self.settled_late;
+        let (late, deep) = (self.settled_late, self.too_deep);
+        let at_once = compiled - late - deep;
         _ = writeln!(
             text,
-            "  canonical text is a fixed point at once: {at_once}, later: {}",
-            self.settled_late
+            "  canonical text is a fixed point at once: {at_once}, later: {late}, too deep for a source: {deep}"
         );
         _ = writeln!(
             text,
@@ -241,6 +248,15 @@ impl Report {
 pub fn folder() -> PathBuf {
     let target = Path::new(env!("CARGO_TARGET_TMPDIR"));
     target.parent().unwrap_or(target).join("fuzz")
+}
+
+fn is_too_deep(outcome: &Outcome) -> bool {
+    let is_limit = |message: &str| {
+        ["nested deeper", "operators in one piece", "too long to be written out"]
+            .iter()
+            .any(|limit| message.contains(limit))
+    };
+    outcome.diagnostics.iter().any(|diagnostic| is_limit(&diagnostic.message))
 }
 
 fn kind(died: &Died) -> String {

@@ -1,7 +1,5 @@
 //! Damage, small and monstrous.
 
-use std::fmt::Write as _;
-
 use crate::corpus::Input;
 use crate::random::Random;
 
@@ -181,84 +179,64 @@ fn chain(random: &mut Random) -> String {
 
 /// Declarations that ask for much, by themselves or by what each does to the one before.
 fn bomb(is_wgsl: bool, random: &mut Random) -> String {
-    let count = *random.pick(&[8, 20, 60, 300]);
-    let mut text = String::from("\n");
-    let kind = random.below(7);
-    if is_wgsl {
-        match kind {
-            0 => {
-                text += "var<private> huge: array<array<f32, 65535>, 65535>; @fragment fn fz() { huge[1][2] = 1.0; }"
-            }
-            1 => {
-                text += "const huge = array<f32, 10000000>(); @fragment fn fz() -> @location(0) vec4f { return vec4f(huge[3]); }"
-            }
-            2 => {
-                text += "alias B0 = f32;";
-                (0..count).for_each(|i| _ = write!(text, "alias B{} = array<B{i}, 2>;", i + 1));
-                _ = write!(text, "const bomb = B{count}();");
-            }
-            3 => {
-                text += "struct B0 { a: f32 }";
-                (0..count).for_each(|i| _ = write!(text, "struct B{} {{ a: B{i}, b: B{i} }}", i + 1));
-                _ = write!(
-                    text,
-                    "var<private> bomb: B{count}; @fragment fn fz() {{ var b = bomb; bomb = b; }}"
-                );
-            }
-            4 => {
-                text += "fn b0() -> f32 { return 1.0; }";
-                (0..count)
-                    .for_each(|i| _ = write!(text, "fn b{}() -> f32 {{ return b{i}() + b{i}(); }}", i + 1));
-                _ = write!(text, "@fragment fn fz() -> @location(0) vec4f {{ return vec4f(b{count}()); }}");
-            }
-            5 => {
-                text += "const b0 = vec4f(1.0);";
-                (0..count).for_each(|i| _ = write!(text, "const b{} = b{i} + b{i} * b{i};", i + 1));
-            }
-            _ => {
-                text += "@compute @workgroup_size(1) fn fz() {";
-                (0..count).for_each(|i| {
-                    _ = write!(
-                        text,
-                        "for (var i{i} = 0; i{i} < 2147483647; i{i}++) {{ switch i{i} {{ default {{}} }} }}"
-                    )
-                });
-                text += "}";
-            }
+    let (kind, count) = (random.below(7), *random.pick(&[8, 20, 60, 300]));
+    if is_wgsl { wgsl_bomb(kind, count) } else { glsl_bomb(kind, count) }
+}
+
+/// What `line` makes of each number and the one after it.
+fn each(count: usize, line: impl Fn(usize, usize) -> String) -> String {
+    (0..count).map(|index| line(index, index + 1)).collect()
+}
+
+fn wgsl_bomb(kind: usize, count: usize) -> String {
+    match kind {
+        0 => "\nvar<private> huge: array<array<f32, 65535>, 65535>; @fragment fn fz() { huge[1][2] = 1.0; }".to_owned(),
+        1 => "\nconst huge = array<f32, 10000000>(); @fragment fn fz() -> @location(0) vec4f { return vec4f(huge[3]); }".to_owned(),
+        2 => {
+            let aliases = each(count, |i, next| format!("alias B{next} = array<B{i}, 2>;"));
+            format!("\nalias B0 = f32;{aliases} const bomb = B{count}();")
         }
-    } else {
-        match kind {
-            0 => text += "float huge[2147483647];\n",
-            1 => {
-                (0..count).for_each(|i| _ = writeln!(text, "#define B{i} B{} B{}", i + 1, i + 1));
-                text += "float bomb = B0;\n";
-            }
-            2 => {
-                (0..count).for_each(|i| _ = writeln!(text, "#define B{i}(x) B{}(x x) B{}(x)", i + 1, i + 1));
-                text += "float bomb = B0(1.0);\n";
-            }
-            3 => {
-                text += "struct B0 { float a; };\n";
-                (0..count).for_each(|i| _ = writeln!(text, "struct B{} {{ B{i} a; B{i} b[9]; }};", i + 1));
-                _ = writeln!(text, "uniform Bomb {{ B{count} bomb; }};");
-            }
-            4 => {
-                text += "float b0() { return 1.0; }\n";
-                (0..count)
-                    .for_each(|i| _ = writeln!(text, "float b{}() {{ return b{i}() + b{i}(); }}", i + 1));
-            }
-            5 => {
-                text += "#if 1\n";
-                text += &"#if 1\n#elif 1\n".repeat(count);
-            }
-            _ => {
-                text += "void fz() {";
-                (0..count).for_each(|i| _ = write!(text, "for (int i{i} = 0; i{i} < 2147483647; i{i}++) ;"));
-                text += "}\n";
-            }
+        3 => {
+            let structs = each(count, |i, next| format!("struct B{next} {{ a: B{i}, b: B{i} }}"));
+            format!("\nstruct B0 {{ a: f32 }}{structs} var<private> bomb: B{count}; @fragment fn fz() {{ var b = bomb; bomb = b; }}")
+        }
+        4 => {
+            let calls = each(count, |i, next| format!("fn b{next}() -> f32 {{ return b{i}() + b{i}(); }}"));
+            format!("\nfn b0() -> f32 {{ return 1.0; }}{calls} @fragment fn fz() -> @location(0) vec4f {{ return vec4f(b{count}()); }}")
+        }
+        5 => "\nconst b0 = vec4f(1.0);".to_owned() + &each(count, |i, next| format!("const b{next} = b{i} + b{i} * b{i};")),
+        _ => {
+            let looped = |i, _| format!("for (var i{i} = 0; i{i} < 2147483647; i{i}++) {{ switch i{i} {{ default {{}} }} }}");
+            format!("\n@compute @workgroup_size(1) fn fz() {{ {} }}", each(count, looped))
         }
     }
-    text
+}
+
+fn glsl_bomb(kind: usize, count: usize) -> String {
+    match kind {
+        0 => "\nfloat huge[2147483647];\n".to_owned(),
+        1 => format!(
+            "\n{}float bomb = B0;\n",
+            each(count, |i, next| format!("#define B{i} B{next} B{next}\n"))
+        ),
+        2 => {
+            let macros = each(count, |i, next| format!("#define B{i}(x) B{next}(x x) B{next}(x)\n"));
+            format!("\n{macros}float bomb = B0(1.0);\n")
+        }
+        3 => {
+            let structs = each(count, |i, next| format!("struct B{next} {{ B{i} a; B{i} b[9]; }};\n"));
+            format!("\nstruct B0 {{ float a; }};\n{structs}uniform Bomb {{ B{count} bomb; }};\n")
+        }
+        4 => {
+            let calls = each(count, |i, next| format!("float b{next}() {{ return b{i}() + b{i}(); }}\n"));
+            format!("\nfloat b0() {{ return 1.0; }}\n{calls}")
+        }
+        5 => format!("\n#if 1\n{}", "#if 1\n#elif 1\n".repeat(count)),
+        _ => format!(
+            "\nvoid fz() {{ {} }}\n",
+            each(count, |i, _| format!("for (int i{i} = 0; i{i} < 2147483647; i{i}++) ;"))
+        ),
+    }
 }
 
 /// Files that include each other: in a circle, doubling, or many.
