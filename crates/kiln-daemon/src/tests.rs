@@ -123,8 +123,8 @@ fn closed_or_moved_file_is_whole_and_a_written_one_is_not() {
     use notify::event::{AccessKind, AccessMode, DataChange, ModifyKind, RenameMode};
     let event = |kind| Ok(notify::Event::new(kind));
     let ends = |kind| crate::watch::ends_a_save(&event(kind));
-    assert!(ends(notify::EventKind::Access(AccessKind::Close(AccessMode::Write))));
-    assert!(ends(notify::EventKind::Modify(ModifyKind::Name(RenameMode::To))));
-    assert!(!ends(notify::EventKind::Modify(ModifyKind::Data(DataChange::Any))));
-    assert!(!ends(notify::EventKind::Access(AccessKind::Close(AccessMode::Read))));
+    assert!(ends(EventKind::Access(AccessKind::Close(AccessMode::Write))));
+    assert!(ends(EventKind::Modify(ModifyKind::Name(RenameMode::To))));
+    assert!(!ends(EventKind::Modify(ModifyKind::Data(DataChange::Any))));
+    assert!(!ends(EventKind::Access(AccessKind::Close(AccessMode::Read))));
 }

@@ -146,7 +146,8 @@ impl Span {
         let line_end = text[start..].find('\n').map_or(text.len(), |at| start + at);
         let line = text[..line_start].bytes().filter(|&byte| byte == b'\n').count() + 1;
         let source_line = text[line_start..line_end].trim_end_matches('\r');
-        let column = text[line_start..start].chars().count() + 1;
+        // Some editors put a mark first in a file, and none shows it.
+        let column = text[line_start..start].chars().filter(|character| *character != '\u{feff}').count() + 1;
         let length = text[start..end.min(line_end)].chars().count().max(1);
         Span {
             line: saturate(line),

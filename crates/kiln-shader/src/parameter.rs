@@ -80,7 +80,7 @@ fn next_code(text: &str) -> &str {
 fn annotation(kind: &str, rest: &str, code: &str) -> Result<Annotation, String> {
     let (inside, label) = rest.split_once(')').ok_or("this annotation is never closed")?;
     let arguments: Vec<&str> = inside.split(',').map(str::trim).collect();
-    let name = declared_name(code).ok_or("this annotation stands at no declaration")?.to_owned();
+    let (name, value) = declaration(code)?;
     let label = label.trim().to_owned();
     let number = |text: &str| -> Result<f64, String> {
         let number: Option<f64> = text.parse().ok();
@@ -115,19 +115,37 @@ fn annotation(kind: &str, rest: &str, code: &str) -> Result<Annotation, String> 
             (Widget::Choice { names }, vec![default])
         }
     };
-    Ok(Annotation { name, widget, default, label })
+    let default = if default.is_empty() { value.into_iter().collect() } else { default };
+    Ok(Annotation { name: name.to_owned(), widget, default, label })
 }
 
-/// What a line declares: the word before its `:` in WGSL, before its `;`, `=` or `[` in GLSL.
-fn declared_name(code: &str) -> Option<&str> {
-    let tokens = token::tokenize(code).ok()?;
-    let word_before = |at: usize| -> Option<&str> {
-        let token = tokens.get(at.checked_sub(1)?).filter(|token| token.kind == Kind::Word)?;
-        Some(&code[token.range()])
-    };
-    let place =
-        |marks: &[char]| tokens.iter().position(|token: &Token| marks.iter().any(|mark| token.is(*mark)));
-    place(&[':']).or_else(|| place(&[';', '=', '['])).and_then(word_before)
+/// What a line declares: the word before its `:` in WGSL, before its `;`, `=` or `[` in GLSL; and the number behind its `=`.
+fn declaration(code: &str) -> Result<(&str, Option<f64>), String> {
+    let nowhere = || "this annotation stands at no declaration".to_owned();
+    let all = token::tokenize(code).map_err(|_| nowhere())?;
+    // What stands in brackets, as in `layout(location = 0)`, declares nothing.
+    let mut depth = 0_usize;
+    let mut tokens: Vec<Token> = Vec::new();
+    for token in all {
+        match token.kind {
+            Kind::Mark(')') => depth = depth.saturating_sub(1),
+            Kind::Mark('(') => depth += 1,
+            _ if depth == 0 => tokens.push(token),
+            _ => {}
+        }
+    }
+    let is = |token: &Token, marks: &[char]| marks.iter().any(|mark| token.is(*mark));
+    let mut places = tokens.iter().enumerate().filter(|(_, token)| token.is(':')).map(|(at, _)| at);
+    let (first, second) = (places.next(), places.next());
+    let commas = tokens.iter().take_while(|token| !is(token, &[';', '='])).filter(|token| token.is(','));
+    if second.is_some() || (first.is_none() && commas.count() > 0) {
+        return Err("this annotation stands at two declarations: give each its line".to_owned());
+    }
+    let end = first.or_else(|| tokens.iter().position(|token| is(token, &[';', '=', '['])));
+    let name = end.and_then(|at| tokens.get(at.checked_sub(1)?)).filter(|token| token.kind == Kind::Word);
+    let value = tokens.iter().position(|token| token.is('=')).and_then(|at| tokens.get(at + 1));
+    let value = value.and_then(|token| code[token.range()].trim_end_matches(['f', 'u', 'i']).parse().ok());
+    Ok((&code[name.ok_or_else(nowhere)?.range()], value))
 }
 
 /// The parameters that a shader has: annotations whose name is an override or a member of a uniform. A color may have a

@@ -86,6 +86,12 @@ pub(crate) fn place(functions: Vec<LinkedFunction>, graph: &Graph, linked: &Link
             let module = &graph.modules[module];
             source.line = Span::new(&module.text, range).line;
             source.file.clone_from(&module.path);
+            // Linking may have given names a form of its own.
+            for name in source.locals.values_mut().chain([&mut source.source_name]) {
+                if let Some((range, _)) = module.renames.iter().find(|(_, new)| new == name) {
+                    module.text[range.clone()].clone_into(name);
+                }
+            }
         }
         source
     });

@@ -13,6 +13,40 @@ fn wrong_project_files_are_explained() {
         ("version = 1\n[env.a]\nsource = 5\n", "must be a string", 3),
         ("version = 1\n[env.a]\nsource = \"a.hdr\"\nerror = 0\n", "`error` in [env.a] must be from", 4),
         ("version = 1\n[env.a]\nsource = \"a.hdr\"\nformat = \"rgba16\"\n", "did you mean `rgba16f`?", 4),
+        (
+            "version = 1\n[shader.a]\nsource = \"a.wgsl\"\nvariants = [\"../../b\"]\n",
+            "`../../b` is no feature",
+            4,
+        ),
+        ("version = 1\n[shader.a]\nsource = \"../a.wgsl\"\n", "lies outside the project", 3),
+        (
+            "version = 1\n[shader.a]\nsource = \"a.frag\"\nprelude = [\"/etc/passwd\"]\n",
+            "lies outside the project",
+            4,
+        ),
+        (
+            "version = 1\n[shader.a]\nsource = \"a.frag\"\ninclude = [\"x/../..\"]\n",
+            "lies outside the project",
+            4,
+        ),
+        (
+            "version = 1\n[shader.a]\nsource = \"a.frag\"\ntextures = [\"t=../t.png\"]\n",
+            "lies outside the project",
+            4,
+        ),
+        (
+            "version = 1\n[shader.a]\nsource = \"a.frag\"\ntextures = [\"t.png\"]\n",
+            "names no variable and file",
+            4,
+        ),
+        (
+            "version = 1\n[shader.a]\nsource = \"a.frag\"\ndefines = [\"A B=1\"]\n",
+            "`A B` is no name of a macro",
+            4,
+        ),
+        ("version = 1\n[shader.a]\nsource = \"a.wgsl\"\ndefines = [\"A=1\"]\n", "`defines` is for GLSL", 4),
+        ("version = 1\n[shader.a]\nsource = []\n", "`source` names no file", 3),
+        ("version = 1\n[shader.a]\nsource = \"a.wgsl\"\nemit = [\"spirw\"]\n", "did you mean `spirv`?", 4),
         ("version = 1\n[envs.a]\nsource = \"a.hdr\"\n", "did you mean `env`?", 2),
         (
             "version = 1\n[env.sky]\nsource = \"a\"\n[scene.s]\nsource = \"s\"\nenv = \"skyy\"\n[shader.pbr]\nsource = \"p\"\n",

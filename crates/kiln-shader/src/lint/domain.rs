@@ -34,9 +34,10 @@ impl Walk<'_, '_> {
     /// Where an expression stands. naga's GLSL front end does not know it for calls of functions: then where the operand
     /// that was read last stands.
     pub fn span(&self, handle: Handle<Expression>) -> Span {
-        let before = self.function.expressions.iter().take(handle.index() + 1);
-        let spans = before.map(|(handle, _)| self.function.expressions.get_span(handle));
-        spans.filter(|span| span.is_defined()).last().unwrap_or_default()
+        let before = self.function.expressions.iter();
+        let before = before.rev().skip_while(|(at, _)| at.index() > handle.index());
+        let mut spans = before.map(|(at, _)| self.function.expressions.get_span(at));
+        spans.find(|span| span.is_defined()).unwrap_or_default()
     }
 
     fn hazard(&self, handle: Handle<Expression>) -> Option<Hazard> {

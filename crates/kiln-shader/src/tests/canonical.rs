@@ -191,6 +191,23 @@ fn layout_that_the_author_chose_is_kept_in_the_text() {
 }
 
 #[test]
+fn words_of_attributes_are_no_names() {
+    let text = "var<private> centroid: f32 = 1.0; var<private> position: f32 = 2.0;
+        struct In { @location(0) @interpolate(perspective, centroid) uv: vec2f, @builtin(position) at: vec4f }
+        @fragment fn fs_main(in: In) -> @location(0) vec4f { return vec4f(in.uv, in.at.x * position, centroid); }";
+    let wgsl = compile_one(text).wgsl;
+    assert!(wgsl.contains("@interpolate(perspective, centroid)"), "{wgsl}");
+}
+
+#[test]
+fn halves_are_packed_without_optional_features() {
+    compile_one(
+        "@fragment fn fs_main(@location(0) x: vec2f) -> @location(0) vec4f {
+        return vec4f(unpack2x16float(pack2x16float(x)), quantizeToF16(x)); }",
+    );
+}
+
+#[test]
 fn storage_textures_and_depth_are_reflected() {
     let reflection = compile_one(
         "@group(0) @binding(0) var out: texture_storage_2d_array<rgba16float, write>;

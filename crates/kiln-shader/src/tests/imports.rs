@@ -62,6 +62,32 @@ fn local_does_not_capture_an_aliased_name() {
 }
 
 #[test]
+fn local_that_would_capture_a_path_is_refused() {
+    let root = "import lib::b::GAIN; fn f(GAIN: f32) -> f32 { return GAIN * lib::b::GAIN; } fn result() -> f32 { return f(1.0); }";
+    let outcome = Files::new(&[("a.wgsl", &format!("{root}\n{MAIN}")), B]).compile("a.wgsl", &[]);
+    let message =
+        "error: `GAIN` is a local here, and is imported under another name too\n  --> a.wgsl:1:27\n";
+    assert!(rendered(&outcome).starts_with(message), "{}", rendered(&outcome));
+    // Without the local both names mean the same, and without the import the local is told apart.
+    let text = canonical("import lib::b::GAIN; fn result() -> f32 { return GAIN * lib::b::GAIN; }", &[B]);
+    assert!(text.contains("vec4(4f)") || text.contains("4f"), "{text}");
+    let apart =
+        "fn f(GAIN: f32) -> f32 { return GAIN * lib::b::GAIN; } fn result() -> f32 { return f(1.0); }";
+    assert!(canonical(apart, &[B]).contains("* 2f"), "{}", canonical(apart, &[B]));
+}
+
+#[test]
+fn module_of_the_same_folder_and_paths_in_attributes_are_found() {
+    let module = ("k.wgsl", "const N = 8; const M = 2;");
+    let root = "import super::k;
+        @group(0) @binding(k::M) var<storage, read_write> out: f32;
+        @compute @workgroup_size(package::k::N) fn main() { out = f32(k::N); }";
+    let compiled = compiled(Files::new(&[("a.wgsl", root), module]).compile("a.wgsl", &[]));
+    assert_eq!(compiled.reflection.entry_points[0].workgroup_size, [8, 1, 1]);
+    assert_eq!(compiled.reflection.bindings[0].binding, 2);
+}
+
+#[test]
 fn variable_keeps_the_name_it_is_bound_by() {
     let module =
         ("lib/v.wgsl", "@group(0) @binding(0) var<uniform> tint: vec4f; fn own() -> f32 { return tint.x; }");

@@ -75,6 +75,22 @@ fn wrong_annotations_are_warned_of_at_their_place() {
 }
 
 #[test]
+fn glsl_declarations_are_read_with_their_layouts_and_first_values() {
+    let text = "#version 450
+layout(location = 3) uniform float wet; // @slider(0, 1)
+uniform float dry = 0.5; // @slider(0, 2)
+layout(location = 0) out vec4 color;
+void main() { color = vec4(wet, dry, 0.0, 1.0); }";
+    let outcome = Files::new(&[("a.frag", text)]).compile("a.frag", &[]);
+    let found: Vec<_> =
+        compiled(outcome).reflection.parameters.into_iter().map(|p| (p.name, p.default)).collect();
+    assert_eq!(found, [("wet".to_owned(), vec![0.0]), ("dry".to_owned(), vec![0.5])]);
+    let two = text.replace("float dry = 0.5", "float dry, damp");
+    let outcome = Files::new(&[("a.frag", &two)]).compile("a.frag", &[]);
+    assert!(rendered(&outcome).contains("stands at two declarations"), "{}", rendered(&outcome));
+}
+
+#[test]
 fn other_comments_are_none_of_ours() {
     let text = SHADER.replace("// @slider(1, 64)", "// see @slider(9, 0) and @group(0)");
     let outcome = Files::new(&[("a.wgsl", &text)]).compile("a.wgsl", &[]);
