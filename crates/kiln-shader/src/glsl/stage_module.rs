@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use naga::front::glsl::{Error, ErrorKind, ExpectedToken, Frontend, Options, TokenValue};
 use naga::{AddressSpace, Barrier, Block, Module, Statement, TypeInner};
 
-use super::{lower, stage};
+use super::{inout, lower, stage};
 use crate::explain::Finding;
 use crate::front::{self, Fault};
 use crate::lint::{self, Warning};
@@ -31,6 +31,7 @@ fn run(text: &str, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fau
     name_variables(&mut module, stage, names);
     name_members(&mut module);
     module.functions.iter_mut().for_each(|(_, function)| repair(&mut function.body));
+    inout::copy_parts(&mut module);
     if let Err(error) = front::validate(&module) {
         let mut finding = front::validation_finding(&module, &error);
         finding.message = in_glsl(&finding.message);
