@@ -244,6 +244,7 @@ impl Writer<'_, '_, '_> {
             Item::Block(block) => self.block(block),
             Item::Qualifiers(qualifiers, names) => {
                 check::layouts(self.sources, qualifiers);
+                check::packing(self.sources, self.stage, qualifiers, None);
                 let place = qualifiers.layout.first().map(|layout| layout.name.place);
                 let place = place.or(names.first().map(|name| name.place));
                 let Some(place) = place else { return };
@@ -416,10 +417,12 @@ impl Writer<'_, '_, '_> {
 
     fn block(&mut self, block: &Block) {
         let place = block.name.place;
+        check::layouts(self.sources, &block.qualifiers);
+        block.members.iter().for_each(|member| check::layouts(self.sources, &member.qualifiers));
         if locations::direction(&block.qualifiers, self.stage.stage).is_some() {
             return;
         }
-        check::layouts(self.sources, &block.qualifiers);
+        check::packing(self.sources, self.stage, &block.qualifiers, Some(&block.members));
         if let Some(bracket) = block.array.first() {
             let message = format!("`{}` is an array of blocks", block.name.text);
             return self.report(bracket.place, message, "declare an array inside of one block");
@@ -439,7 +442,6 @@ impl Writer<'_, '_, '_> {
         put(&mut self.globals, std::slice::from_ref(&block.name));
         self.globals.push("{\n", place);
         for member in &block.members {
-            check::layouts(self.sources, &member.qualifiers);
             check::block_member(self.sources, self.stage, member, is_uniform);
             let mut member = member.clone();
             if is_flattened(block) {

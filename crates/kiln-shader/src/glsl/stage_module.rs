@@ -1,9 +1,11 @@
 //! One stage through naga: lowered GLSL in, canonical WGSL out.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use naga::front::glsl::{Error, ErrorKind, ExpectedToken, Frontend, Options, TokenValue};
-use naga::{AddressSpace, Barrier, Block, Module, Statement, TypeInner};
+use naga::valid::{FunctionError, ValidationError};
+use naga::{AddressSpace, Barrier, Block, Expression, Module, Statement, TypeInner};
 
 use super::{inout, lower, stage};
 use crate::explain::Finding;
@@ -34,6 +36,10 @@ fn run(text: &str, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fau
     inout::copy_parts(&mut module);
     if let Err(error) = front::validate(&module) {
         let mut finding = front::validation_finding(&module, &error);
+        if let Some((message, range)) = stored(&module, error.as_inner()) {
+            finding.message = message;
+            finding.labels.splice(0..0, range.map(|range| (range, String::new())));
+        }
         finding.message = in_glsl(&finding.message);
         // The chain of entry points and functions: the place says it.
         finding.notes.retain(|note| !(note.starts_with("function '") || note.starts_with("entry point")));
@@ -136,6 +142,28 @@ fn ends(block: &Block) -> bool {
         Some(Statement::If { accept, reject, .. }) => ends(accept) && ends(reject),
         _ => false,
     }
+}
+
+/// What an assignment of another type says, and where the value stands: naga names the variable's declaration.
+fn stored(module: &Module, error: &ValidationError) -> Option<(String, Option<Range<usize>>)> {
+    let ValidationError::Function { handle, source, .. } = error else { return None };
+    let FunctionError::InvalidStoreTypes { pointer, value } = source else { return None };
+    let function = &module.functions[*handle];
+    let mut root = *pointer;
+    let name = loop {
+        match &function.expressions[root] {
+            Expression::Access { base, .. } | Expression::AccessIndex { base, .. } => root = *base,
+            Expression::LocalVariable(local) => break function.local_variables[*local].name.as_deref(),
+            Expression::GlobalVariable(global) => break module.global_variables[*global].name.as_deref(),
+            Expression::FunctionArgument(index) => {
+                break function.arguments.get(usize::try_from(*index).ok()?)?.name.as_deref();
+            }
+            _ => break None,
+        }
+    };
+    let target = name.map_or("this".to_owned(), |name| format!("`{name}`"));
+    let message = format!("a value of another type is assigned to {target}");
+    Some((message, function.expressions.get_span(*value).to_range()))
 }
 
 /// naga's types in GLSL's words.
