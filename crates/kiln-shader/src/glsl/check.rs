@@ -92,13 +92,24 @@ pub fn layouts(sources: &mut Sources<'_, '_>, qualifiers: &Qualifiers) {
 
 /// Checks what is said of the layout of a block's members, or of all blocks: WGSL has one for uniforms, about
 /// `std140`, and one for buffers, `std430`.
-pub fn packing(sources: &mut Sources<'_, '_>, stage: &Parsed, qualifiers: &Qualifiers, members: Option<&[Variable]>) {
+pub fn packing(
+    sources: &mut Sources<'_, '_>,
+    stage: &Parsed,
+    qualifiers: &Qualifiers,
+    members: Option<&[Variable]>,
+) {
     let is_buffer = qualifiers.is("buffer");
     let other = if is_buffer { "std140" } else { "std430" };
-    let differs = members.is_none_or(|members| members.iter().any(|member| !is_same_in_both(stage, member, 0)));
-    if let Some(layout) = qualifiers.layout(other).filter(|_| differs && (is_buffer || qualifiers.is("uniform"))) {
+    let differs =
+        members.is_none_or(|members| members.iter().any(|member| !is_same_in_both(stage, member, 0)));
+    if let Some(layout) =
+        qualifiers.layout(other).filter(|_| differs && (is_buffer || qualifiers.is("uniform")))
+    {
         let (message, help) = if is_buffer {
-            ("`std140` is not supported for this buffer", "write `std430`, or use arrays of `vec4` for others")
+            (
+                "`std140` is not supported for this buffer",
+                "write `std430`, or use arrays of `vec4` for others",
+            )
         } else {
             ("`std430` is not supported for uniforms", "write `std140`, or use a buffer")
         };
@@ -126,7 +137,8 @@ fn is_same_in_both(stage: &Parsed, member: &Variable, depth: usize) -> bool {
     }
     let Some(structure) = structure(stage, &member.ty) else { return true };
     let is_wide = |member: &Variable| {
-        builtin::vector_len(&member.ty.text).is_some_and(|len| len > 2) || builtin::columns(&member.ty.text).is_some()
+        builtin::vector_len(&member.ty.text).is_some_and(|len| len > 2)
+            || builtin::columns(&member.ty.text).is_some()
     };
     depth < STRUCTS_MAX
         && structure.members.iter().any(is_wide)

@@ -45,7 +45,8 @@ pub fn is_effect(word: &str) -> bool {
 }
 
 fn writable(stage: &Parsed) -> BTreeSet<&str> {
-    let mut found = BTreeSet::from(["gl_FragColor", "gl_FragData", "gl_FragDepth", "gl_Position", "gl_PointSize"]);
+    let mut found =
+        BTreeSet::from(["gl_FragColor", "gl_FragData", "gl_FragDepth", "gl_Position", "gl_PointSize"]);
     let is_writable = |qualifiers: &Qualifiers| {
         !["const", "in", "uniform", "attribute"].iter().any(|storage| qualifiers.is(storage))
     };

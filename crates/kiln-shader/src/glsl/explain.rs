@@ -12,7 +12,12 @@ use crate::front::Fault;
 use crate::suggest;
 
 /// A diagnostic for what naga found in the text of a stage.
-pub fn of_stage(sources: &Sources<'_, '_>, stage: &Parsed, text: &Mapped, mut finding: Finding) -> Diagnostic {
+pub fn of_stage(
+    sources: &Sources<'_, '_>,
+    stage: &Parsed,
+    text: &Mapped,
+    mut finding: Finding,
+) -> Diagnostic {
     if let Some(message) = unfit(stage, &finding.message) {
         finding.message = message;
     }

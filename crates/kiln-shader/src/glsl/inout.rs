@@ -73,7 +73,13 @@ fn block(pointees: &[Vec<Option<Handle<Type>>>], function: &mut Function, body: 
     *body = out;
 }
 
-fn copy(function: &mut Function, out: &mut Block, from: Handle<Expression>, to: Handle<Expression>, span: Span) {
+fn copy(
+    function: &mut Function,
+    out: &mut Block,
+    from: Handle<Expression>,
+    to: Handle<Expression>,
+    span: Span,
+) {
     let value = function.expressions.append(Expression::Load { pointer: from }, span);
     out.push(Statement::Emit(naga::Range::new_from_bounds(value, value)), span);
     out.push(Statement::Store { pointer: to, value }, span);

@@ -177,7 +177,8 @@ fn check_index(sources: &mut Sources<'_, '_>, tokens: &[Token], open: usize, clo
             _ => break,
         }
     }
-    let before = start.checked_sub(1).is_some_and(|before| tokens[before].is("++") || tokens[before].is("--"));
+    let before =
+        start.checked_sub(1).is_some_and(|before| tokens[before].is("++") || tokens[before].is("--"));
     if after || before {
         let place = tokens[open].place.to(tokens[close].place);
         let fault = sources.error(place, "this index has an effect, and its element is read and written");

@@ -211,7 +211,26 @@ fn operator(name: &str) -> &str {
     }
 }
 
+/// An operator between types that it does not take, which naga notices late: at what stands after it.
+fn incompatible(text: &str, error: &Error) -> Option<Finding> {
+    let message = error.kind.to_string();
+    let (_, operation) = message.split_once("IncompatibleOperands(")?;
+    let sign = operator(operation.trim_start_matches(['"', '\\']).split('(').next()?);
+    let end = error.meta.to_range()?.end;
+    let labels =
+        text.get(..end)?.rfind(&format!(" {sign} ")).map(|at| (at + 1..at + 1 + sign.len(), String::new()));
+    let message = if operation.contains("Struct {") {
+        format!("structs do not go together in `{sign}`: use their members")
+    } else {
+        format!("these types do not go together in `{sign}`")
+    };
+    Some(Finding { message, notes: Vec::new(), labels: labels.into_iter().collect() })
+}
+
 fn finding(text: &str, error: &Error) -> Finding {
+    if let Some(finding) = incompatible(text, error) {
+        return finding;
+    }
     let range = error.meta.to_range();
     let found = range.clone().and_then(|range| text.get(range)).unwrap_or("the end").to_owned();
     let message = match &error.kind {
