@@ -9,8 +9,7 @@ use super::lex::Token;
 use super::source::{Place, Sources};
 
 /// Layouts that are understood, or change nothing because everything is filled by name.
-const LAYOUTS: [&str; 27] = [
-    "align",
+const LAYOUTS: [&str; 22] = [
     "binding",
     "column_major",
     "constant_id",
@@ -19,17 +18,13 @@ const LAYOUTS: [&str; 27] = [
     "depth_less",
     "depth_unchanged",
     "early_fragment_tests",
-    "index",
     "local_size_x",
     "local_size_y",
     "local_size_z",
     "location",
-    "offset",
     "origin_upper_left",
     "packed",
     "push_constant",
-    "row_major",
-    "scalar",
     "set",
     "shared",
     "std140",
@@ -40,7 +35,12 @@ const LAYOUTS: [&str; 27] = [
 ];
 
 /// Layouts that ask for what is not there, with what to do instead.
-const REFUSED_LAYOUTS: [(&str, &str); 12] = [
+const REFUSED_LAYOUTS: [(&str, &str); 17] = [
+    ("align", "leave it out, and put a member before this one to move it"),
+    ("index", "WGSL has one colour for each location: leave out the second source"),
+    ("offset", "leave it out, and put a member before this one to move it"),
+    ("row_major", "leave it out, and give the transposed matrix or write `transpose(m)`"),
+    ("scalar", "use `std430`, and `float` members in place of a `vec3` that others follow closely"),
     ("bindless_sampler", "declare each texture as a uniform"),
     ("bindless_image", "declare each image as a uniform"),
     ("buffer_reference", "use a storage buffer and an index"),
@@ -88,6 +88,61 @@ pub fn layouts(sources: &mut Sources<'_, '_>, qualifiers: &Qualifiers) {
             report(sources, place, format!("`{name}` must be an integer literal"), "use a macro for a name");
         }
     }
+}
+
+/// Checks what is said of the layout of a block's members, or of all blocks: WGSL has one for uniforms, about
+/// `std140`, and one for buffers, `std430`.
+pub fn packing(
+    sources: &mut Sources<'_, '_>,
+    stage: &Parsed,
+    qualifiers: &Qualifiers,
+    members: Option<&[Variable]>,
+) {
+    let is_buffer = qualifiers.is("buffer");
+    let other = if is_buffer { "std140" } else { "std430" };
+    let differs =
+        members.is_none_or(|members| members.iter().any(|member| !is_same_in_both(stage, member, 0)));
+    if let Some(layout) =
+        qualifiers.layout(other).filter(|_| differs && (is_buffer || qualifiers.is("uniform")))
+    {
+        let (message, help) = if is_buffer {
+            (
+                "`std140` is not supported for this buffer",
+                "write `std430`, or use arrays of `vec4` for others",
+            )
+        } else {
+            ("`std430` is not supported for uniforms", "write `std140`, or use a buffer")
+        };
+        report(sources, layout.name.place, message.to_owned(), help);
+    }
+    for name in ["packed", "shared"] {
+        if let Some(layout) = qualifiers.layout(name) {
+            let used = if is_buffer { "std430" } else { "std140" };
+            let warning = sources.warning(layout.name.place, format!("`{name}` is the same as `{used}`"));
+            sources.diagnostics.push(warning.with_help(format!("write `{used}`, which says the layout")));
+        }
+    }
+}
+
+/// Structs inside of each other that are looked into.
+const STRUCTS_MAX: usize = 16;
+
+/// Whether `std140` and `std430` store a member alike: it has no array of what is less than 16 bytes, and no
+/// struct that is aligned to less.
+fn is_same_in_both(stage: &Parsed, member: &Variable, depth: usize) -> bool {
+    let ty = &*member.ty.text;
+    let is_short_matrix = builtin::columns(ty).is_some() && (ty.ends_with("x2") || ty == "mat2");
+    if is_short_matrix || (!member.array.is_empty() && is_narrow(ty)) {
+        return false;
+    }
+    let Some(structure) = structure(stage, &member.ty) else { return true };
+    let is_wide = |member: &Variable| {
+        builtin::vector_len(&member.ty.text).is_some_and(|len| len > 2)
+            || builtin::columns(&member.ty.text).is_some()
+    };
+    depth < STRUCTS_MAX
+        && structure.members.iter().any(is_wide)
+        && structure.members.iter().all(|member| is_same_in_both(stage, member, depth + 1))
 }
 
 /// Checks a type's name.

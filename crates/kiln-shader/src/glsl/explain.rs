@@ -5,13 +5,22 @@ use kiln_diagnostic::{Diagnostic, Span};
 use super::Parsed;
 use super::bindings::Bindings;
 use super::builtin;
+use super::declare::Item;
 use super::source::{Mapped, Sources};
 use crate::explain::Finding;
 use crate::front::Fault;
 use crate::suggest;
 
 /// A diagnostic for what naga found in the text of a stage.
-pub fn of_stage(sources: &Sources<'_, '_>, stage: &Parsed, text: &Mapped, finding: Finding) -> Diagnostic {
+pub fn of_stage(
+    sources: &Sources<'_, '_>,
+    stage: &Parsed,
+    text: &Mapped,
+    mut finding: Finding,
+) -> Diagnostic {
+    if let Some(message) = unfit(stage, &finding.message) {
+        finding.message = message;
+    }
     let mut labels = finding.labels.into_iter();
     let main = labels.next().map(|(range, _)| range);
     let Some(place) = main.and_then(|range| text.origin(range)) else {
@@ -24,6 +33,15 @@ pub fn of_stage(sources: &Sources<'_, '_>, stage: &Parsed, text: &Mapped, findin
     diagnostic.notes.splice(0..0, finding.notes);
     diagnostic.help = help;
     diagnostic
+}
+
+/// What to say of a call of a function that exists, but not for these arguments.
+fn unfit(stage: &Parsed, message: &str) -> Option<String> {
+    let name = message.strip_prefix("unknown function `")?.strip_suffix('`')?;
+    let name = name.strip_prefix("kiln_").unwrap_or(name);
+    let is_own = |item: &Item| matches!(item, Item::Function(function) if function.name.is(name));
+    let exists = builtin::FUNCTIONS.contains(&name) || stage.items.iter().any(is_own);
+    exists.then(|| format!("no `{name}` takes these types"))
 }
 
 fn help(
@@ -41,7 +59,7 @@ fn help(
         suggest::closest(named, words().chain(builtin::FUNCTIONS))
     } else if message.starts_with("no type") {
         suggest::closest(named, words().chain(builtin::TYPES))
-    } else if message.starts_with("no ") {
+    } else if message.starts_with("no ") && !message.ends_with("takes these types") {
         suggest::closest(named, words())
     } else if message.starts_with("expected") && message.contains("`;`") {
         let text = &sources.files[file].text;

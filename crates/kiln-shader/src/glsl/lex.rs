@@ -163,6 +163,22 @@ pub fn closing(tokens: &[Token], open: usize) -> Option<usize> {
     None
 }
 
+/// Index of the bracket that the one at `close` closes, if brackets pair up.
+pub fn opening(tokens: &[Token], close: usize) -> Option<usize> {
+    let mut depth = 0_usize;
+    for (index, token) in tokens.iter().enumerate().take(close + 1).rev() {
+        match &*token.text {
+            ")" | "]" | "}" => depth += 1,
+            "(" | "[" | "{" => depth = depth.checked_sub(1)?,
+            _ => {}
+        }
+        if depth == 0 {
+            return Some(index);
+        }
+    }
+    None
+}
+
 /// Splits at the commas outside of all brackets; nothing gives nothing.
 pub fn split_commas(tokens: &[Token]) -> Vec<&[Token]> {
     let mut parts = Vec::new();

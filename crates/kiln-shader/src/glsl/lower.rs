@@ -9,6 +9,8 @@ use super::bindings::{self, Bindings};
 use super::builtin;
 use super::check;
 use super::declare::{self, Block, Function, Item, Variable};
+use super::effects;
+use super::lazy;
 use super::lex::{Kind, Token};
 use super::locations::{self, Interface, Passed};
 use super::order;
@@ -46,6 +48,7 @@ pub fn lower(
         samplers: BTreeSet::new(),
         runtime: BTreeSet::new(),
         padded: padding::padded_structs(stage),
+        effects: effects::functions(stage),
         prologue: Mapped::default(),
         epilogue: Mapped::default(),
     };
@@ -76,6 +79,8 @@ struct Writer<'a, 's, 'r> {
     runtime: BTreeSet<Rc<str>>,
     /// Structs that need one member more.
     padded: BTreeSet<Rc<str>>,
+    /// Functions whose calls may not be left out or made twice.
+    effects: BTreeSet<Rc<str>>,
     /// What is done before the author's `main`.
     prologue: Mapped,
     /// What is done after it.
@@ -119,10 +124,7 @@ fn scene(stage: &Parsed) -> Scene {
             }
             Item::Block(block) => {
                 block_meanings(&mut scene, stage, block);
-                let members = block
-                    .members
-                    .iter()
-                    .filter(|member| member.array.windows(2).any(|pair| pair[0].is("[") && pair[1].is("]")));
+                let members = block.members.iter().filter(|member| is_unsized(member));
                 scene.unsized_members.extend(members.map(|member| Rc::clone(&member.name.text)));
             }
             Item::Qualifiers(qualifiers, _) => {
@@ -142,10 +144,11 @@ fn scene(stage: &Parsed) -> Scene {
 fn block_meanings(scene: &mut Scene, stage: &Parsed, block: &Block) {
     let is_passed = locations::direction(&block.qualifiers, stage.stage).is_some();
     let is_uniform = block.qualifiers.is("uniform");
+    let is_flat = is_flattened(block);
     let mut members = BTreeMap::new();
     for member in &block.members {
         let name = member.name.text.to_string();
-        if is_passed {
+        if is_passed || is_flat {
             members.insert(name, Member::Renamed(locations::member_name(&block.name, &member.name)));
         } else if let (_, Some(stored)) = stored_type(member)
             && is_uniform
@@ -162,6 +165,17 @@ fn block_meanings(scene: &mut Scene, stage: &Parsed, block: &Block) {
     {
         scene.meanings.insert(instance.text.to_string(), Meaning::Instance(members));
     }
+}
+
+/// Whether a member is an array without a length.
+fn is_unsized(member: &Variable) -> bool {
+    member.array.windows(2).any(|pair| pair[0].is("[") && pair[1].is("]"))
+}
+
+/// Whether a buffer's members are written as globals, though it has an instance. naga reads a member of an
+/// instance by loading all of the block, which it cannot if an array has no length.
+fn is_flattened(block: &Block) -> bool {
+    block.qualifiers.is("buffer") && block.instance.is_some() && block.members.iter().any(is_unsized)
 }
 
 /// The type that a uniform is stored as, and how its uses are written if that is another.
@@ -230,6 +244,7 @@ impl Writer<'_, '_, '_> {
             Item::Block(block) => self.block(block),
             Item::Qualifiers(qualifiers, names) => {
                 check::layouts(self.sources, qualifiers);
+                check::packing(self.sources, self.stage, qualifiers, None);
                 let place = qualifiers.layout.first().map(|layout| layout.name.place);
                 let place = place.or(names.first().map(|name| name.place));
                 let Some(place) = place else { return };
@@ -295,7 +310,8 @@ impl Writer<'_, '_, '_> {
             let message = format!("`{}` is initialised with a list", variable.name.text);
             return self.report(initial[0].place, message, "write a constructor, as in `float[2](1.0, 2.0)`");
         }
-        let value = Rewriter::new(self.sources, &mut self.scene, None).tokens(initial);
+        let initial = lazy::lower(self.sources, &self.effects, initial);
+        let value = Rewriter::new(self.sources, &mut self.scene, None).tokens(&initial);
         let mark = |text: &str| Token::new(Kind::Mark, text, variable.place());
         let assignment = [variable.name.clone(), mark("=")].into_iter().chain(value).chain([mark(";")]);
         put(&mut self.prologue, &assignment.collect::<Vec<Token>>());
@@ -401,10 +417,12 @@ impl Writer<'_, '_, '_> {
 
     fn block(&mut self, block: &Block) {
         let place = block.name.place;
+        check::layouts(self.sources, &block.qualifiers);
+        block.members.iter().for_each(|member| check::layouts(self.sources, &member.qualifiers));
         if locations::direction(&block.qualifiers, self.stage.stage).is_some() {
             return;
         }
-        check::layouts(self.sources, &block.qualifiers);
+        check::packing(self.sources, self.stage, &block.qualifiers, Some(&block.members));
         if let Some(bracket) = block.array.first() {
             let message = format!("`{}` is an array of blocks", block.name.text);
             return self.report(bracket.place, message, "declare an array inside of one block");
@@ -415,7 +433,8 @@ impl Writer<'_, '_, '_> {
             if is_uniform { ("std140", "") } else { ("std430", check::buffer_access(block)) };
         let keyword = if is_uniform { "uniform" } else { "buffer" };
         // naga takes members of a block for globals even if there is an instance: a struct has none.
-        let head = match &block.instance {
+        let instance = block.instance.as_ref().filter(|_| !is_flattened(block));
+        let head = match instance {
             Some(_) => "struct ".to_owned(),
             None => format!("layout({packing}, {layout}) {access} {keyword} "),
         };
@@ -423,12 +442,15 @@ impl Writer<'_, '_, '_> {
         put(&mut self.globals, std::slice::from_ref(&block.name));
         self.globals.push("{\n", place);
         for member in &block.members {
-            check::layouts(self.sources, &member.qualifiers);
             check::block_member(self.sources, self.stage, member, is_uniform);
-            self.member(member, is_uniform);
+            let mut member = member.clone();
+            if is_flattened(block) {
+                member.name.text = Rc::from(locations::member_name(&block.name, &member.name));
+            }
+            self.member(&member, is_uniform);
         }
         self.globals.push("};\n", place);
-        if let Some(instance) = &block.instance {
+        if let Some(instance) = instance {
             self.globals.push(&format!("layout({layout}) {access} {keyword} "), instance.place);
             put(&mut self.globals, &[block.name.clone(), instance.clone()]);
             self.globals.push(";\n", instance.place);
@@ -517,7 +539,8 @@ impl Writer<'_, '_, '_> {
         let mut rewriter = Rewriter::new(self.sources, &mut self.scene, returned);
         let parameters: Vec<Vec<Token>> =
             function.parameters.iter().map(|parameter| rewriter.parameter(parameter)).collect();
-        let body = function.body.as_ref().map(|body| switch::without_fall_through(rewriter.sources, body));
+        let body = function.body.as_ref().map(|body| lazy::lower(rewriter.sources, &self.effects, body));
+        let body = body.map(|body| switch::without_fall_through(rewriter.sources, &body));
         let body = body.map(|body| rewriter.tokens(&body));
         put(&mut self.functions, &result);
         let is_wrapped = function.name.is("main") && self.wraps_main();

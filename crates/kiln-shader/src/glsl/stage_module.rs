@@ -1,11 +1,13 @@
 //! One stage through naga: lowered GLSL in, canonical WGSL out.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use naga::front::glsl::{Error, ErrorKind, ExpectedToken, Frontend, Options, TokenValue};
-use naga::{AddressSpace, Barrier, Block, Module, Statement, TypeInner};
+use naga::valid::{FunctionError, ValidationError};
+use naga::{AddressSpace, Barrier, Block, Expression, Module, Statement, TypeInner};
 
-use super::{lower, stage};
+use super::{inout, lower, stage};
 use crate::explain::Finding;
 use crate::front::{self, Fault};
 use crate::lint::{self, Warning};
@@ -38,8 +40,13 @@ fn run(text: &str, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fau
     name_variables(&mut module, stage, names);
     name_members(&mut module);
     module.functions.iter_mut().for_each(|(_, function)| repair(&mut function.body));
+    inout::copy_parts(&mut module);
     if let Err(error) = front::validate(&module) {
         let mut finding = front::validation_finding(&module, &error);
+        if let Some((message, range)) = stored(&module, error.as_inner()) {
+            finding.message = message;
+            finding.labels.splice(0..0, range.map(|range| (range, String::new())));
+        }
         finding.message = in_glsl(&finding.message);
         // The chain of entry points and functions: the place says it.
         finding.notes.retain(|note| !(note.starts_with("function '") || note.starts_with("entry point")));
@@ -144,6 +151,28 @@ fn ends(block: &Block) -> bool {
     }
 }
 
+/// What an assignment of another type says, and where the value stands: naga names the variable's declaration.
+fn stored(module: &Module, error: &ValidationError) -> Option<(String, Option<Range<usize>>)> {
+    let ValidationError::Function { handle, source, .. } = error else { return None };
+    let FunctionError::InvalidStoreTypes { pointer, value } = source else { return None };
+    let function = &module.functions[*handle];
+    let mut root = *pointer;
+    let name = loop {
+        match &function.expressions[root] {
+            Expression::Access { base, .. } | Expression::AccessIndex { base, .. } => root = *base,
+            Expression::LocalVariable(local) => break function.local_variables[*local].name.as_deref(),
+            Expression::GlobalVariable(global) => break module.global_variables[*global].name.as_deref(),
+            Expression::FunctionArgument(index) => {
+                break function.arguments.get(usize::try_from(*index).ok()?)?.name.as_deref();
+            }
+            _ => break None,
+        }
+    };
+    let target = name.map_or("this".to_owned(), |name| format!("`{name}`"));
+    let message = format!("a value of another type is assigned to {target}");
+    Some((message, function.expressions.get_span(*value).to_range()))
+}
+
 /// naga's types in GLSL's words.
 fn in_glsl(message: &str) -> String {
     if let Some(operation) = message.strip_prefix("operation ").and_then(|rest| rest.split(' ').next()) {
@@ -189,7 +218,26 @@ fn operator(name: &str) -> &str {
     }
 }
 
+/// An operator between types that it does not take, which naga notices late: at what stands after it.
+fn incompatible(text: &str, error: &Error) -> Option<Finding> {
+    let message = error.kind.to_string();
+    let (_, operation) = message.split_once("IncompatibleOperands(")?;
+    let sign = operator(operation.trim_start_matches(['"', '\\']).split('(').next()?);
+    let end = error.meta.to_range()?.end;
+    let labels =
+        text.get(..end)?.rfind(&format!(" {sign} ")).map(|at| (at + 1..at + 1 + sign.len(), String::new()));
+    let message = if operation.contains("Struct {") {
+        format!("structs do not go together in `{sign}`: use their members")
+    } else {
+        format!("these types do not go together in `{sign}`")
+    };
+    Some(Finding { message, notes: Vec::new(), labels: labels.into_iter().collect() })
+}
+
 fn finding(text: &str, error: &Error) -> Finding {
+    if let Some(finding) = incompatible(text, error) {
+        return finding;
+    }
     let range = error.meta.to_range();
     let found = range.clone().and_then(|range| text.get(range)).unwrap_or("the end").to_owned();
     let message = match &error.kind {

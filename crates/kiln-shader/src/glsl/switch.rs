@@ -93,7 +93,11 @@ fn written(cases: &[Case]) -> Vec<Token> {
 fn ends(body: &[Token]) -> bool {
     let Some((last, rest)) = body.split_last() else { return false };
     if last.is("}") {
-        return ends(rest);
+        // Only a block of its own: that of an `if` may not run, and a loop's `break` ends the loop.
+        let Some(open) = lex::opening(body, body.len() - 1) else { return false };
+        let before = open.checked_sub(1).map(|before| &body[before]);
+        let is_bare = before.is_none_or(|before| [";", "{", "}"].iter().any(|mark| before.is(mark)));
+        return is_bare && ends(&body[open + 1..body.len() - 1]);
     }
     // The word before the `;`, or at the start of the last statement, as in `return a + b;`.
     let start = rest.iter().rposition(|token| [";", "{", "}"].iter().any(|mark| token.is(mark)));
