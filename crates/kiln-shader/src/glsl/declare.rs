@@ -119,6 +119,20 @@ impl Variable {
     pub fn place(&self) -> Place {
         self.name.place
     }
+
+    /// Whether it is an array without a length.
+    pub fn is_unsized(&self) -> bool {
+        self.array.windows(2).any(|pair| pair[0].is("[") && pair[1].is("]"))
+    }
+}
+
+impl Block {
+    /// Whether a buffer's members are written as globals, though it has an instance. naga reads a member of an
+    /// instance by loading all of the block, which it cannot if an array has no length.
+    pub fn is_flattened(&self) -> bool {
+        let has_unsized = self.members.iter().any(Variable::is_unsized);
+        self.qualifiers.is("buffer") && self.instance.is_some() && has_unsized
+    }
 }
 
 /// Qualifiers that say nothing to WGSL.

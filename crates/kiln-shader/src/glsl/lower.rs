@@ -124,7 +124,7 @@ fn scene(stage: &Parsed) -> Scene {
             }
             Item::Block(block) => {
                 block_meanings(&mut scene, stage, block);
-                let members = block.members.iter().filter(|member| is_unsized(member));
+                let members = block.members.iter().filter(|member| member.is_unsized());
                 scene.unsized_members.extend(members.map(|member| Rc::clone(&member.name.text)));
             }
             Item::Qualifiers(qualifiers, _) => {
@@ -144,7 +144,7 @@ fn scene(stage: &Parsed) -> Scene {
 fn block_meanings(scene: &mut Scene, stage: &Parsed, block: &Block) {
     let is_passed = locations::direction(&block.qualifiers, stage.stage).is_some();
     let is_uniform = block.qualifiers.is("uniform");
-    let is_flat = is_flattened(block);
+    let is_flat = block.is_flattened();
     let mut members = BTreeMap::new();
     for member in &block.members {
         let name = member.name.text.to_string();
@@ -165,17 +165,6 @@ fn block_meanings(scene: &mut Scene, stage: &Parsed, block: &Block) {
     {
         scene.meanings.insert(instance.text.to_string(), Meaning::Instance(members));
     }
-}
-
-/// Whether a member is an array without a length.
-fn is_unsized(member: &Variable) -> bool {
-    member.array.windows(2).any(|pair| pair[0].is("[") && pair[1].is("]"))
-}
-
-/// Whether a buffer's members are written as globals, though it has an instance. naga reads a member of an
-/// instance by loading all of the block, which it cannot if an array has no length.
-fn is_flattened(block: &Block) -> bool {
-    block.qualifiers.is("buffer") && block.instance.is_some() && block.members.iter().any(is_unsized)
 }
 
 /// The type that a uniform is stored as, and how its uses are written if that is another.
@@ -433,7 +422,7 @@ impl Writer<'_, '_, '_> {
             if is_uniform { ("std140", "") } else { ("std430", check::buffer_access(block)) };
         let keyword = if is_uniform { "uniform" } else { "buffer" };
         // naga takes members of a block for globals even if there is an instance: a struct has none.
-        let instance = block.instance.as_ref().filter(|_| !is_flattened(block));
+        let instance = block.instance.as_ref().filter(|_| !block.is_flattened());
         let head = match instance {
             Some(_) => "struct ".to_owned(),
             None => format!("layout({packing}, {layout}) {access} {keyword} "),
@@ -444,7 +433,7 @@ impl Writer<'_, '_, '_> {
         for member in &block.members {
             check::block_member(self.sources, self.stage, member, is_uniform);
             let mut member = member.clone();
-            if is_flattened(block) {
+            if block.is_flattened() {
                 member.name.text = Rc::from(locations::member_name(&block.name, &member.name));
             }
             self.member(&member, is_uniform);
