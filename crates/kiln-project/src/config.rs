@@ -444,7 +444,12 @@ fn is_identifier(name: &str) -> bool {
 /// What leaves the project is refused: what is read may be shown.
 fn check_inside(section: &mut Section, key: &'static str, paths: &[String]) {
     for path in paths {
-        let leaves = Path::new(path).is_absolute() || path.split('/').any(|part| part == "..");
+        let mut depth = 0_i32;
+        let mut goes_above = |part: &str| {
+            depth += if part == ".." { -1 } else { 1 };
+            depth < 0
+        };
+        let leaves = Path::new(path).is_absolute() || path.split('/').any(&mut goes_above);
         if leaves {
             let help = "copy or link it into the project's folder";
             let message = format!("`{path}` in `{key}` lies outside the project");
