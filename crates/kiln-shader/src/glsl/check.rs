@@ -72,8 +72,21 @@ pub fn is_dropped(token: &Token) -> bool {
 
 /// Checks the names and numbers in `layout(…)`.
 pub fn layouts(sources: &mut Sources<'_, '_>, qualifiers: &Qualifiers) {
+    layouts_but(sources, qualifiers, &[]);
+}
+
+/// Checks the layouts of a block's member. Push constants become a uniform that is filled by name: where they lie does not
+/// matter, and stages share one block by giving each its part.
+pub fn member_layouts(sources: &mut Sources<'_, '_>, qualifiers: &Qualifiers, is_pushed: bool) {
+    layouts_but(sources, qualifiers, if is_pushed { &["offset", "align"] } else { &[] });
+}
+
+fn layouts_but(sources: &mut Sources<'_, '_>, qualifiers: &Qualifiers, free: &[&str]) {
     for layout in &qualifiers.layout {
         let name = &*layout.name.text;
+        if free.contains(&name) {
+            continue;
+        }
         if let Some((_, help)) = REFUSED_LAYOUTS.iter().find(|(refused, _)| *refused == name) {
             report(sources, layout.name.place, format!("layout `{name}` is not supported"), help);
         } else if !LAYOUTS.contains(&name) && !is_format(name) {

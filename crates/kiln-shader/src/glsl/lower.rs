@@ -407,7 +407,10 @@ impl Writer<'_, '_, '_> {
     fn block(&mut self, block: &Block) {
         let place = block.name.place;
         check::layouts(self.sources, &block.qualifiers);
-        block.members.iter().for_each(|member| check::layouts(self.sources, &member.qualifiers));
+        let is_pushed = block.qualifiers.layout("push_constant").is_some();
+        for member in &block.members {
+            check::member_layouts(self.sources, &member.qualifiers, is_pushed);
+        }
         if locations::direction(&block.qualifiers, self.stage.stage).is_some() {
             return;
         }
