@@ -16,12 +16,13 @@ struct Params {
 }
 @group(3) @binding(0) var<uniform> params: Params;
 override gain: f32 = 1.0; // @slider(0, 2)
+@id(7) override is_bright: bool = true; // @toggle(true)
 @vertex fn vs_main(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
     return vec4f(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0, 0.0, 1.0);
 }
 @fragment fn fs_main() -> @location(0) vec4f {
     let red = params.level * gain * f32(params.mode + 1u);
-    return vec4f(red, f32(params.steps) * 0.25 * params.tint.x, params.tint.w * f32(params.is_on), 1.0);
+    return vec4f(red, f32(params.steps) * 0.25 * params.tint.x, params.tint.w * f32(params.is_on) * select(0.0, 1.0, is_bright), 1.0);
 }";
 
 const FIRST: [u8; 4] = [64, 64, 255, 255];
@@ -62,6 +63,7 @@ fn every_kind_of_parameter_changes_the_picture_at_once() {
         ("tint=1,0,0", [64, 128, 255, 255]),
         ("mode=doubled", [128, 64, 255, 255]),
         ("is_on=false", [64, 64, 0, 255]),
+        ("is_bright=false", [64, 64, 0, 255]),
         ("gain=2", [128, 64, 255, 255]),
         ("gain = 0", [0, 64, 255, 255]),
     ];

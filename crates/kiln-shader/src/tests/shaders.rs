@@ -45,7 +45,7 @@ const OWNED: [(&str, &str); 20] = [
     ("transmission", "transmission_"),
     ("volume", "attenuation_color"),
     ("volume", "attenuation_distance"),
-    ("volume", "thickness_factor"),
+    ("volume", "thickness_"),
 ];
 
 /// Every file of the repository's `shaders/lib`, `shaders/pbr` and `shaders/bake`.
