@@ -3,16 +3,15 @@
 import lib::anisotropy::anisotropic_normal;
 import lib::material::texture_coordinate;
 import lib::vector::normalize_or;
-import super::interface::{material, Varying};
+import super::interface::{base_color_sampler, material, Varying};
 
 @group(1) @binding(27) var anisotropy_texture: texture_2d<f32>;
-@group(1) @binding(28) var anisotropy_sampler: sampler;
 
 // The normal that mirror directions are taken at; `normal` itself where the mesh has no tangents.
 fn brushed_normal(in: Varying, normal: vec3f, view: vec3f, perceptual_roughness: f32) -> vec3f {
     let uv = texture_coordinate(material.anisotropy_uv_u, material.anisotropy_uv_v, in.uv0, in.uv1);
     // Red and green hold the brush's direction in the tangent frame, blue how strong it is.
-    let texel = textureSample(anisotropy_texture, anisotropy_sampler, uv);
+    let texel = textureSample(anisotropy_texture, base_color_sampler, uv);
     let direction = texel.rg * 2.0 - 1.0;
     let turn = vec2f(cos(material.anisotropy_rotation), sin(material.anisotropy_rotation));
     let along = vec2f(turn.x * direction.x - turn.y * direction.y, turn.y * direction.x + turn.x * direction.y);

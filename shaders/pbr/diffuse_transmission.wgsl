@@ -2,12 +2,10 @@
 
 import lib::environment::irradiance_over_pi;
 import lib::material::texture_coordinate;
-import super::interface::{material, Varying};
+import super::interface::{base_color_sampler, material, Varying};
 
-@group(1) @binding(35) var diffuse_transmission_texture: texture_2d<f32>;
-@group(1) @binding(36) var diffuse_transmission_sampler: sampler;
-@group(1) @binding(37) var diffuse_transmission_color_texture: texture_2d<f32>;
-@group(1) @binding(38) var diffuse_transmission_color_sampler: sampler;
+@group(1) @binding(31) var diffuse_transmission_texture: texture_2d<f32>;
+@group(1) @binding(32) var diffuse_transmission_color_texture: texture_2d<f32>;
 
 // The share of light that scatters to the other side, and its colour there.
 struct Scattering {
@@ -17,14 +15,14 @@ struct Scattering {
 
 fn scattering(in: Varying) -> Scattering {
     let uv = texture_coordinate(material.diffuse_transmission_uv_u, material.diffuse_transmission_uv_v, in.uv0, in.uv1);
-    let texel = textureSample(diffuse_transmission_texture, diffuse_transmission_sampler, uv);
+    let texel = textureSample(diffuse_transmission_texture, base_color_sampler, uv);
     let color_uv = texture_coordinate(
         material.diffuse_transmission_color_uv_u,
         material.diffuse_transmission_color_uv_v,
         in.uv0,
         in.uv1,
     );
-    let color_texel = textureSample(diffuse_transmission_color_texture, diffuse_transmission_color_sampler, color_uv);
+    let color_texel = textureSample(diffuse_transmission_color_texture, base_color_sampler, color_uv);
     let share = saturate(material.diffuse_transmission_factor * texel.a);
     return Scattering(share, saturate(material.diffuse_transmission_color_factor * color_texel.rgb));
 }

@@ -78,6 +78,10 @@ struct Draw {
 @group(1) @binding(0) var<uniform> material: Material;
 @group(2) @binding(0) var<uniform> draw: Draw;
 
+// Base colour is read through it, and so are the maps of anisotropy, iridescence, volume and diffuse transmission: backends have places
+// for 16 samplers, and materials that wrap these otherwise than their base colour are rare.
+@group(1) @binding(2) var base_color_sampler: sampler;
+
 struct Vertex {
     @location(0) position: vec3f,
     @if(!unlit) @location(1) normal: vec3f,

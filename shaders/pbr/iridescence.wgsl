@@ -3,12 +3,10 @@
 import lib::brdf::f0_of_schlick;
 import lib::iridescence::f_iridescence;
 import lib::material::texture_coordinate;
-import super::interface::{material, Varying};
+import super::interface::{base_color_sampler, material, Varying};
 
-@group(1) @binding(29) var iridescence_texture: texture_2d<f32>;
-@group(1) @binding(30) var iridescence_sampler: sampler;
-@group(1) @binding(31) var iridescence_thickness_texture: texture_2d<f32>;
-@group(1) @binding(32) var iridescence_thickness_sampler: sampler;
+@group(1) @binding(28) var iridescence_texture: texture_2d<f32>;
+@group(1) @binding(29) var iridescence_thickness_texture: texture_2d<f32>;
 
 struct Film {
     weight: f32,
@@ -17,14 +15,14 @@ struct Film {
 
 fn film(in: Varying) -> Film {
     let uv = texture_coordinate(material.iridescence_uv_u, material.iridescence_uv_v, in.uv0, in.uv1);
-    let weight = material.iridescence_factor * textureSample(iridescence_texture, iridescence_sampler, uv).r;
+    let weight = material.iridescence_factor * textureSample(iridescence_texture, base_color_sampler, uv).r;
     let thickness_uv = texture_coordinate(
         material.iridescence_thickness_uv_u,
         material.iridescence_thickness_uv_v,
         in.uv0,
         in.uv1,
     );
-    let texel = textureSample(iridescence_thickness_texture, iridescence_thickness_sampler, thickness_uv);
+    let texel = textureSample(iridescence_thickness_texture, base_color_sampler, thickness_uv);
     let thickness_nm = mix(material.iridescence_thickness_minimum, material.iridescence_thickness_maximum, texel.g);
     return Film(saturate(weight), thickness_nm);
 }

@@ -11,7 +11,7 @@ import lib::vector::normalize_or;
 @if(!unlit) import super::base::{Base, base_radiance, filtered_roughness};
 @if(clearcoat && !unlit) import super::clearcoat::{coat, under_coat};
 @if(diffuse_transmission && !unlit) import super::diffuse_transmission::scattering;
-import super::interface::{draw, material, Varying, Vertex};
+import super::interface::{base_color_sampler, draw, material, Varying, Vertex};
 @if(iridescence && !unlit) import super::iridescence::film;
 @if(sheen && !unlit) import super::sheen::{sheen, under_sheen};
 @if(specular && !unlit) import super::specular::dielectric_reflectance;
@@ -19,7 +19,6 @@ import super::interface::{draw, material, Varying, Vertex};
 @if((diffuse_transmission || transmission) && volume && !unlit) import super::volume::medium_transmittance;
 
 @group(1) @binding(1) var base_color_texture: texture_2d<f32>;
-@group(1) @binding(2) var base_color_sampler: sampler;
 @if(!unlit) @group(1) @binding(3) var metallic_roughness_texture: texture_2d<f32>;
 @if(!unlit) @group(1) @binding(4) var metallic_roughness_sampler: sampler;
 @if(normal_map && !unlit) @group(1) @binding(5) var normal_texture: texture_2d<f32>;

@@ -3,15 +3,14 @@
 import lib::material::texture_coordinate;
 import lib::vector::normalize_or;
 import lib::volume::volume_attenuation;
-import super::interface::{draw, material, Varying};
+import super::interface::{base_color_sampler, draw, material, Varying};
 
-@group(1) @binding(33) var thickness_texture: texture_2d<f32>;
-@group(1) @binding(34) var thickness_sampler: sampler;
+@group(1) @binding(30) var thickness_texture: texture_2d<f32>;
 
 // Share of light left after the thickness below a point.
 fn medium_transmittance(in: Varying, normal: vec3f) -> vec3f {
     let uv = texture_coordinate(material.thickness_uv_u, material.thickness_uv_v, in.uv0, in.uv1);
-    let thickness = material.thickness_factor * textureSample(thickness_texture, thickness_sampler, uv).g;
+    let thickness = material.thickness_factor * textureSample(thickness_texture, base_color_sampler, uv).g;
     let distance = thickness * object_scale_along(normal);
     return volume_attenuation(distance, material.attenuation_color, material.attenuation_distance);
 }
