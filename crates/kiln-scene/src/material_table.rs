@@ -157,11 +157,7 @@ fn needs(pruned: &Pruned) -> Needs {
         uv[uv_set(info) as usize] = true;
         true
     });
-    let tangents = tangent_space(&material);
-    if let Some(placed) = tangents {
-        uv[placed.uv_set as usize] = true;
-    }
-    Needs { normals: material.extensions.unlit.is_none(), tangents, uv }
+    Needs { normals: material.extensions.unlit.is_none(), tangents: tangent_space(&material), uv }
 }
 
 /// Where the tangents of a mesh without any come from: the placement of the first texture that is read through them. A

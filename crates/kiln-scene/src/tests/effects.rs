@@ -122,7 +122,19 @@ fn brush_gets_tangents_along_the_first_coordinates_where_the_mesh_has_none() {
     assert_eq!(scene.materials[0].anisotropy_rotation, 0.25);
     for vertex in &scene.primitives[0].vertices {
         super::check_within("tangent", &vertex.tangent[..3], &[1.0, 0.0, 0.0], 1e-6);
+        assert_eq!(vertex.uv0, [0.0; 2], "nothing else reads them");
     }
+}
+
+#[test]
+fn brush_on_a_mesh_with_tangents_asks_for_no_coordinates() {
+    let mut file = File::with_material(dielectric(json!({"anisotropy": {"anisotropyStrength": 0.5}})));
+    let tangents = file.floats(&[[0.0, 1.0, 0.0, 1.0]; 3]);
+    file.primitive()["attributes"]["TANGENT"] = json!(tangents);
+    file.primitive()["attributes"].as_object_mut().unwrap().remove("TEXCOORD_0");
+    let scene = scene_of(&file.bytes());
+    assert_eq!(scene.notes, Vec::<String>::new());
+    assert_eq!(scene.primitives[0].vertices[0].tangent, [0.0, 1.0, 0.0, 1.0]);
 }
 
 #[test]
