@@ -4,10 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use kiln_diagnostic::Diagnostic;
+use kiln_scene::Effect;
 use kiln_shader::{Language, Program};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use crate::demand::EffectOverrides;
 use crate::env_config::{EnvConfig, read_env};
 use crate::lut_config::{LutConfig, read_lut};
 use crate::reader::{Document, Section, suggest};
@@ -34,6 +36,8 @@ pub struct Project {
     pub is_without_default_lut: bool,
     /// What the baked files may take together: the budget of `[check]`.
     pub bytes_max: Option<u64>,
+    /// `[effects]`.
+    pub effects: EffectOverrides,
 }
 
 /// A scene, and what it is looked at with.
@@ -118,12 +122,14 @@ pub fn parse_project(text: &str) -> (Project, Vec<Diagnostic>) {
         output_dir: "baked".to_owned(),
         is_without_default_lut: false,
         bytes_max: None,
+        effects: EffectOverrides::default(),
     };
     read_root(&mut document, root.get_ref(), &mut project);
     (project, document.diagnostics)
 }
 
-const TABLES: [&str; 8] = ["version", "project", "env", "lut", "scene", "shader", "output", "check"];
+const TABLES: [&str; 9] =
+    ["version", "project", "env", "lut", "scene", "shader", "effects", "output", "check"];
 
 fn read_root<'a>(document: &mut Document<'a>, root: &DeTable<'a>, project: &mut Project) {
     check_version(document, root);
@@ -149,6 +155,9 @@ fn read_root<'a>(document: &mut Document<'a>, root: &DeTable<'a>, project: &mut 
             }),
             "check" => read_single(document, "check", value, |section| {
                 project.bytes_max = section.bytes("max_bytes");
+            }),
+            "effects" => read_single(document, "effects", value, |section| {
+                project.effects = read_effects(section);
             }),
             "env" => read_named(document, "env", value, |section, _| read_env(section), &mut project.envs),
             // [lut.ggx] stands for the default table.
@@ -282,6 +291,29 @@ fn read_scene(section: &mut Section, envs: &[String], shaders: &[String]) -> Sce
         shader: reference("shader", shaders, "pbr"),
         source: read_source(section, "scenes/scene.gltf"),
     }
+}
+
+fn read_effects(section: &mut Section) -> EffectOverrides {
+    let mut overrides = EffectOverrides::default();
+    for (key, effects) in [("force", &mut overrides.force), ("forbid", &mut overrides.forbid)] {
+        for name in section.texts(key).unwrap_or_default() {
+            match Effect::from_name(&name) {
+                Some(effect) => _ = effects.insert(effect),
+                None => {
+                    let known = Effect::ALL.map(Effect::name);
+                    let help = suggest(&name, known.into_iter())
+                        .unwrap_or_else(|| format!("effects are: {}", known.join(", ")));
+                    section.fail(format!("there is no effect `{name}`"), section.place(key), Some(help));
+                }
+            }
+        }
+    }
+    if let Some(both) = overrides.force.intersection(&overrides.forbid).next() {
+        let message = format!("`{}` is both forced and forbidden", both.name());
+        section.fail(message, section.place("forbid"), None);
+        overrides.force.clear();
+    }
+    overrides
 }
 
 fn read_shader(section: &mut Section, name: &str) -> ShaderConfig {

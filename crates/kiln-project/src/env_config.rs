@@ -23,8 +23,12 @@ pub struct EnvConfig {
     pub skybox_size: Option<usize>,
     /// Edge of the irradiance cube.
     pub irradiance_size: usize,
-    /// Whether there is a Charlie chain too.
+    /// Whether there is a whole Charlie chain, whatever scenes call for.
     pub has_sheen: bool,
+    /// Whether the irradiance and the whole GGX chain are baked, whatever scenes call for.
+    pub bakes_all: bool,
+    /// Perceptual roughness up to which somebody wants to blur the background.
+    pub background_blur: f64,
     /// Highest degree of the harmonics.
     pub sh_order: usize,
     /// Whether the irradiance's harmonics are windowed until they are nowhere negative.
@@ -64,6 +68,8 @@ impl EnvConfig {
             skybox_size: None,
             irradiance_size: 64,
             has_sheen: false,
+            bakes_all: false,
+            background_blur: 0.0,
             sh_order: 2,
             is_sh_windowed: false,
             error: 1e-3,
@@ -123,6 +129,9 @@ pub(crate) fn read_env(section: &mut Section) -> EnvConfig {
     config.skybox_size = section.integer("skybox_size", 1..=4096);
     config.irradiance_size = section.integer("irradiance_size", 1..=1024).unwrap_or(default.irradiance_size);
     config.has_sheen = section.boolean("sheen").unwrap_or(default.has_sheen);
+    config.bakes_all =
+        section.choice("bake", &[("needed", false), ("all", true)]).unwrap_or(default.bakes_all);
+    config.background_blur = section.number("background_blur", 0.0..=1.0).unwrap_or(default.background_blur);
     config.sh_order = section.integer("sh_order", 0..=8).unwrap_or(default.sh_order);
     let windows = [("none", false), ("dering", true)];
     config.is_sh_windowed = section.choice("sh_window", &windows).unwrap_or(default.is_sh_windowed);

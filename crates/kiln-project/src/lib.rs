@@ -17,6 +17,7 @@ pub use config::{
     OwnTexture, Project, Role, SceneConfig, ShaderConfig, parse_define, parse_project, parse_variant,
     variant_name,
 };
+pub use demand::{EffectOverrides, EnvDemand, Reasons, SceneDemand};
 pub use env_config::{EnvConfig, FORMATS, Range, format_name};
 pub use kiln_bake::{BAND_LIMIT_MAX, RoughnessLaw, TexelFormat, decode_level, panorama_of_cube};
 pub use kiln_export::{ExportFile, Preset};
@@ -34,6 +35,7 @@ mod blob;
 mod build;
 mod check;
 mod config;
+mod demand;
 mod env_config;
 mod environment;
 mod export;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use kiln_bake::{Masking, Table, TableAxes};
+use kiln_bake::{Masking, SheenVisibility, Table, TableAxes};
 use kiln_build::{Action, little_memory};
 use serde_json::{Value, json};
 
@@ -13,6 +13,13 @@ use crate::plan::{PartSpec, Planner, rank};
 /// The table that renderers of environments read; `[lut.ggx]` replaces it.
 pub(crate) const DEFAULT: LutConfig =
     LutConfig { table: Table::GgxScaleBias(Masking::SmithCorrelated), size: 128, axes: TableAxes::Uniform };
+
+/// The table that sheen is drawn with; `[lut.charlie]` replaces it.
+pub(crate) const CHARLIE: LutConfig = LutConfig {
+    table: Table::SheenAlbedo(SheenVisibility::Unclamped),
+    size: 128,
+    axes: TableAxes::Uniform,
+};
 
 /// Roughness from which on a table's stated error counts: what lookups are off by below it depends on no size.
 const ERROR_ROUGHNESS_MIN: f64 = 0.089;

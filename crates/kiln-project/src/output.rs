@@ -250,13 +250,20 @@ fn part_path(name: &str, part: &str) -> String {
 
 fn texture_file(name: &str, target: &Target, contents: &[(&str, Arc<[u8]>)]) -> Vec<u8> {
     let fact = |key: &str| target.meta.get(key).and_then(Value::as_u64).unwrap_or(1);
-    let size = usize::try_from(fact("size")).unwrap_or(usize::MAX);
+    // A chain of which the sharpest levels are not read begins where it is: its law says for what roughness.
+    let first = target.meta.get("first_level").and_then(Value::as_u64).unwrap_or(0).min(63);
+    let size = usize::try_from((fact("size") >> first).max(1)).unwrap_or(usize::MAX);
     let width = target.meta.get("width").map_or(size, |_| usize::try_from(fact("width")).unwrap_or(size));
     let format = target.meta.get("format").and_then(Value::as_str).unwrap_or_default();
     let known = FORMATS.iter().find(|(name, _)| *name == format);
     let format = known.map_or(ktx2::Format::R32G32_SFLOAT, |(_, format)| format.ktx2());
     let mut key_values = vec![("KilnTarget".to_owned(), name.to_owned())];
-    for (key, fact) in [("KilnScaleLog2", "scale_log2"), ("KilnLaw", "law")] {
+    for (key, fact) in [
+        ("KilnScaleLog2", "scale_log2"),
+        ("KilnLaw", "law"),
+        ("KilnFirstLevel", "first_level"),
+        ("KilnLevels", "levels_of_law"),
+    ] {
         if let Some(value) = target.meta.get(fact) {
             key_values
                 .push((key.to_owned(), value.as_str().map_or_else(|| value.to_string(), str::to_owned)));

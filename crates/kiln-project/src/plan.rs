@@ -10,7 +10,8 @@ use kiln_build::{
 use kiln_diagnostic::{Diagnostic, has_errors};
 use serde_json::{Map, Value, json};
 
-use crate::{PROJECT_FILE, Project, environment, lut, parse_project, scene, shader};
+use crate::demand::env_demands;
+use crate::{EnvDemand, PROJECT_FILE, Project, SceneDemand, environment, lut, parse_project, scene, shader};
 
 /// What must be done for a project, before any of it is done.
 pub struct Plan {
@@ -20,6 +21,10 @@ pub struct Plan {
     pub graph: Graph,
     /// What the actions make, by name.
     pub targets: Vec<TargetSpec>,
+    /// What each scene calls for.
+    pub scenes: Vec<SceneDemand>,
+    /// What is read of each environment.
+    pub envs: BTreeMap<String, EnvDemand>,
     /// What is wrong with kiln.toml or found while planning.
     pub diagnostics: Vec<Diagnostic>,
     /// The file that an action's messages are about, where they name none themselves.
@@ -158,30 +163,42 @@ pub(crate) fn plan_project(
 ) -> Result<Plan, Error> {
     let mut planner = Planner { diagnostics, ..Planner::default() };
     let mut variants = shader::Variants::default();
+    let mut scenes = Vec::new();
     for (name, config) in &project.scenes {
-        scene::plan_scene(&mut planner, engine, name, config, &mut variants)?;
+        let overrides = &project.effects;
+        scenes.push(scene::plan_scene(&mut planner, engine, name, config, overrides, &mut variants)?);
     }
+    let envs = env_demands(&project, &scenes);
     for (name, config) in &project.shaders {
         shader::plan_shader(&mut planner, engine, name, config, &variants)?;
     }
     for (name, config) in &project.envs {
-        environment::plan_environment(&mut planner, engine, name, config);
+        environment::plan_environment(&mut planner, engine, name, config, &envs[name]);
     }
     // What the preview's shaders read.
-    if !project.envs.is_empty() && !project.is_without_default_lut && !project.luts.contains_key("ggx") {
-        lut::plan_lut(&mut planner, "ggx", &lut::DEFAULT, false);
+    let wanted = [
+        ("ggx", &lut::DEFAULT, envs.values().any(|env| !env.light.is_empty())),
+        ("charlie", &lut::CHARLIE, envs.values().any(EnvDemand::is_sheen_read)),
+    ];
+    for (name, config, is_read) in wanted {
+        if is_read && !project.is_without_default_lut && !project.luts.contains_key(name) {
+            lut::plan_lut(&mut planner, name, config, false);
+        }
     }
     for (name, config) in &project.luts {
         lut::plan_lut(&mut planner, name, config, !project.is_without_default_lut);
     }
-    let meta = json!({
+    let mut meta = json!({
         "name": project.name,
         "scenes": project.scenes.keys().collect::<Vec<_>>(),
         "envs": project.envs.keys().collect::<Vec<_>>(),
     });
+    if let Some(overrides) = project.effects.to_json() {
+        meta["effects"] = overrides;
+    }
     planner.target("project".to_owned(), "project", meta, Vec::new());
     let Planner { graph, targets, diagnostics, subjects } = planner;
-    Ok(Plan { project, graph, targets, diagnostics, subjects })
+    Ok(Plan { project, graph, targets, scenes, envs, diagnostics, subjects })
 }
 
 pub(crate) fn read_project(engine: &Engine, diagnostics: &mut Vec<Diagnostic>) -> Project {

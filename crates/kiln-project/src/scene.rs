@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use kiln_build::{Action, ActionOutput, Engine, Error, Input, Tracker, little_memory};
 use kiln_diagnostic::{Diagnostic, has_errors};
-use kiln_scene::{EffectSet, variant_name};
+use kiln_scene::{MaterialEffects, variant_name};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::SceneConfig;
+use crate::{EffectOverrides, SceneConfig, SceneDemand};
 use crate::environment::{command, failure};
 use crate::plan::{PartSpec, Planner, no_content, rank, unreadable};
 use crate::shader::Variants;
@@ -17,12 +17,12 @@ use crate::shader::Variants;
 /// What a scan of a scene tells the planner.
 #[derive(Default, Serialize, Deserialize)]
 struct SceneScan {
-    /// One list of effect names for each material that is used.
-    effect_sets: Vec<Vec<String>>,
+    /// `None` if the scene cannot be drawn.
+    materials: Option<Vec<MaterialEffects>>,
 }
 
 /// Version of the code behind both the scan and the action.
-const PACK_RECIPE: u32 = 2;
+const PACK_RECIPE: u32 = 3;
 
 /// Adds the actions and targets of one scene and notes the shader variants that it calls for.
 pub(crate) fn plan_scene(
@@ -30,13 +30,19 @@ pub(crate) fn plan_scene(
     engine: &Engine,
     name: &str,
     config: &SceneConfig,
+    overrides: &EffectOverrides,
     variants: &mut Variants,
-) -> Result<(), Error> {
+) -> Result<SceneDemand, Error> {
     let scan =
         engine.scan("scene", PACK_RECIPE, &config.source, |tracker| scan_scene(&config.source, tracker))?;
     let found = SceneScan::deserialize(&scan.found).unwrap_or_default();
-    for effects in found.effect_sets {
-        variants.ask(&config.shader, effects.into_iter().collect());
+    // While a scene cannot be read, what it last called for stays.
+    let materials = found.materials.or_else(|| last_materials(engine, name)).unwrap_or_default();
+    let materials: Vec<MaterialEffects> =
+        materials.iter().map(|material| overrides.apply_to(material)).collect();
+    for material in &materials {
+        let features = material.effects.iter().map(|effect| effect.name().to_owned());
+        variants.ask(&config.shader, features.collect());
     }
     let inputs =
         scan.looked_at.iter().map(|(path, digest)| Input::Source { path: path.clone(), digest: *digest });
@@ -69,7 +75,16 @@ pub(crate) fn plan_scene(
     let meta = json!({"env": config.env, "shader": config.shader});
     let parts = vec![PartSpec::one(pack, "glb"), PartSpec::one(pack, "effects")];
     planner.target(format!("scene/{name}"), "scene", meta, parts);
-    Ok(())
+    let (env, shader) = (config.env.clone(), config.shader.clone());
+    Ok(SceneDemand { name: name.to_owned(), env, shader, materials })
+}
+
+/// The materials of what was published last of a scene.
+fn last_materials(engine: &Engine, name: &str) -> Option<Vec<MaterialEffects>> {
+    let published = engine.published();
+    let part = published.get(&format!("scene/{name}"))?.parts.iter().find(|part| part.name == "effects")?;
+    let mut effects: Value = serde_json::from_slice(&engine.store().get(&part.digest)?).ok()?;
+    serde_json::from_value(effects["materials"].take()).ok()
 }
 
 /// Reads the scene once to learn which files it consists of and which effects it calls for. What is wrong
@@ -77,10 +92,8 @@ pub(crate) fn plan_scene(
 fn scan_scene(source: &str, tracker: &mut Tracker) -> (Value, Vec<Diagnostic>) {
     let Some(bytes) = tracker.read(source) else { return (json!(SceneScan::default()), Vec::new()) };
     let packed = kiln_scene::pack(source, &bytes, &mut |path| tracker.read(path));
-    let sets: std::collections::BTreeSet<&EffectSet> =
-        packed.effects.iter().map(|material| &material.effects).collect();
-    let names = |set: &EffectSet| set.iter().map(|effect| effect.name().to_owned()).collect();
-    (json!(SceneScan { effect_sets: sets.into_iter().map(names).collect() }), Vec::new())
+    let is_sound = packed.glb.is_some() && !has_errors(&packed.diagnostics);
+    (json!(SceneScan { materials: is_sound.then_some(packed.effects) }), Vec::new())
 }
 
 fn pack_scene(source: &str, bytes: &[u8], read: &mut dyn FnMut(&str) -> Option<Arc<[u8]>>) -> ActionOutput {
@@ -93,7 +106,7 @@ fn pack_scene(source: &str, bytes: &[u8], read: &mut dyn FnMut(&str) -> Option<A
             "material": material.material,
             "variant": variant_name(&material.effects),
             "effects": material.effects.iter().map(|effect| effect.name()).collect::<Vec<_>>(),
-            "roughness": material.roughness,
+            "reads": material.reads,
         })
     });
     let effects = serde_json::to_vec_pretty(&json!({"materials": materials.collect::<Vec<_>>()}));

@@ -12,7 +12,7 @@ use crate::material_table::{MaterialTable, Settled};
 use crate::pose::{Pose, joint_matrices, pose};
 use crate::textures::TextureTable;
 use crate::write::GENERATOR;
-use crate::{Bounds, Draw, Primitive, Scene, SceneError};
+use crate::{Bounds, Draw, LightReads, Primitive, Scene, SceneError};
 use crate::{extensions, limits, rig, schema, shape};
 
 /// A scene, and the parts of the file that a pack needs besides.
@@ -21,7 +21,7 @@ pub(crate) struct Imported {
     pub scene: Scene,
     /// Pruned, with indices into `textures`; same order as the scene's.
     pub materials: Vec<schema::Material>,
-    pub roughness: Vec<[f32; 2]>,
+    pub reads: Vec<LightReads>,
     pub textures: Vec<schema::Texture>,
     pub samplers: Vec<schema::Sampler>,
     /// MIME type and bytes.
@@ -111,7 +111,7 @@ impl Importer<'_, '_> {
         }
         order_primitives(&mut self.scene);
         self.scene.bounds = world_bounds(&self.scene);
-        let Settled { materials, flat, roughness, textures, samplers, pictures, notes, warnings } =
+        let Settled { materials, flat, reads, textures, samplers, pictures, notes, warnings } =
             self.materials.settle(&mut self.scene);
         notes.into_iter().for_each(|note| self.notes.push(note));
         self.scene.materials = flat;
@@ -120,7 +120,7 @@ impl Importer<'_, '_> {
         Ok(Imported {
             scene: self.scene,
             materials,
-            roughness,
+            reads,
             textures,
             samplers,
             pictures,

@@ -18,7 +18,7 @@ pub use effect::variant_name;
 pub use error::SceneError;
 pub use images::decode_image;
 
-pub use pack::{MaterialEffects, Packed, SceneSummary, load, pack};
+pub use pack::{LightReads, MaterialEffects, Packed, SceneSummary, load, pack};
 pub use scene::*;
 pub use uri::{Uri, UriKind, external_uris};
 

@@ -8,7 +8,7 @@ use crate::materials::{flatten, parse_alpha_mode, transform_rows, uv_set};
 use crate::prune::{Pruned, prune, retain_textures, settle};
 use crate::schema::{self, TextureInfo};
 use crate::textures::{Found, TextureTable, sampler};
-use crate::{ColorSpace, Material, Scene, SceneError, Texture, TextureRef, extensions, specular_glossiness};
+use crate::{ColorSpace, LightReads, Material, Scene, SceneError, Texture, TextureRef, extensions, specular_glossiness};
 
 pub(crate) struct MaterialTable<'a, 'b> {
     root: &'a schema::Root,
@@ -30,7 +30,7 @@ struct Slot {
 pub(crate) struct Settled {
     pub materials: Vec<schema::Material>,
     pub flat: Vec<Material>,
-    pub roughness: Vec<[f32; 2]>,
+    pub reads: Vec<LightReads>,
     pub textures: Vec<schema::Texture>,
     pub samplers: Vec<schema::Sampler>,
     /// MIME type and bytes of each used image.
@@ -132,7 +132,7 @@ impl<'a, 'b> MaterialTable<'a, 'b> {
             };
             settled.flat.push(flatten(&material, name.clone(), pruned.effects.clone(), &mut place));
             settled.materials.push(material);
-            settled.roughness.push(pruned.roughness);
+            settled.reads.push(pruned.reads);
             final_index.insert(slot, settled.flat.len() - 1);
         }
         for primitive in &mut scene.primitives {

@@ -29,9 +29,18 @@ pub struct MaterialEffects {
     pub material: String,
     /// Its effects.
     pub effects: EffectSet,
-    /// Smallest and largest perceptual roughness that occurs on its base layer and clear coat; for an
-    /// unlit material [1, 0], the empty interval, which leaves a union by minimum and maximum as it is.
-    pub roughness: [f32; 2],
+    /// What it reads of the environment that lights it.
+    pub reads: LightReads,
+}
+
+/// Which lobes of an environment a material is lit by, with the smallest and largest perceptual roughness that its factors
+/// and textures give. A renderer that filters normals reads rougher levels besides. Unlit materials read nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LightReads {
+    /// GGX: base layer, clear coat and refracted light; with it the irradiance.
+    pub ggx: Option<[f32; 2]>,
+    /// Charlie: sheen.
+    pub charlie: Option<[f32; 2]>,
 }
 
 /// A scene in numbers.
@@ -125,12 +134,12 @@ pub fn load(glb: &[u8]) -> Result<Scene, SceneError> {
 }
 
 fn effects(imported: &Imported) -> Vec<MaterialEffects> {
-    let materials = imported.scene.materials.iter().zip(&imported.roughness);
+    let materials = imported.scene.materials.iter().zip(&imported.reads);
     materials
-        .map(|(material, &roughness)| MaterialEffects {
+        .map(|(material, &reads)| MaterialEffects {
             material: material.name.clone(),
             effects: material.effects.clone(),
-            roughness,
+            reads,
         })
         .collect()
 }

@@ -5,7 +5,7 @@
 use crate::images::ChannelRange;
 use crate::materials::parse_alpha_mode;
 use crate::schema::{Clearcoat, Material, NormalTexture, OcclusionTexture, TextureInfo};
-use crate::{AlphaMode, ColorSpace, Effect, EffectSet};
+use crate::{AlphaMode, ColorSpace, Effect, EffectSet, LightReads};
 
 /// Looks up the range of each channel of a texture.
 pub(crate) type Look<'a> = &'a dyn Fn(&TextureInfo) -> ChannelRange;
@@ -15,8 +15,7 @@ pub(crate) type Look<'a> = &'a dyn Fn(&TextureInfo) -> ChannelRange;
 pub(crate) struct Pruned {
     pub material: Material,
     pub effects: EffectSet,
-    /// Perceptual roughness that occurs on base layer and clear coat; [1, 0], the empty interval, if unlit.
-    pub roughness: [f32; 2],
+    pub reads: LightReads,
 }
 
 /// Decides all effects but those that depend on vertex colours: see [`settle`].
@@ -24,7 +23,7 @@ pub(crate) fn prune(mut material: Material, look: Look<'_>) -> Pruned {
     let mut effects = EffectSet::new();
     if material.extensions.unlit.is_some() {
         effects.insert(Effect::Unlit);
-        return Pruned { material: unlit(material), effects, roughness: [1.0, 0.0] };
+        return Pruned { material: unlit(material), effects, reads: LightReads::default() };
     }
     clamp(&mut material);
     let mut keep = |effect, called_for: bool| {
@@ -78,8 +77,8 @@ pub(crate) fn prune(mut material: Material, look: Look<'_>) -> Pruned {
         material.extensions.specular = None;
         material.extensions.ior = None;
     }
-    let roughness = roughness(&material, look);
-    Pruned { material, effects, roughness }
+    let reads = reads(&material, look);
+    Pruned { material, effects, reads }
 }
 
 /// Decides vertex colour and alpha once the geometry is known. `alpha_min` is the smallest vertex alpha.
@@ -352,13 +351,37 @@ fn has_specular(material: &Material, look: Look<'_>) -> bool {
     ior || specular
 }
 
-fn roughness(material: &Material, look: Look<'_>) -> [f32; 2] {
+/// What a lit material that was pruned reads of its environment.
+fn reads(material: &Material, look: Look<'_>) -> LightReads {
+    let extensions = &material.extensions;
     let base = &material.pbr_metallic_roughness;
-    let base = interval(base.roughness_factor, base.metallic_roughness_texture.as_ref(), look);
-    let Some(coat) = &material.extensions.clearcoat else { return base };
-    let Clearcoat { clearcoat_roughness_factor: factor, clearcoat_roughness_texture: texture, .. } = coat;
-    let coat = interval(*factor, texture.as_ref(), look);
-    [base[0].min(coat[0]), base[1].max(coat[1])]
+    let mut ggx = interval(base.roughness_factor, base.metallic_roughness_texture.as_ref(), look);
+    if extensions.transmission.is_some() {
+        ggx[0] *= share_refracted(material);
+    }
+    if let Some(Clearcoat { clearcoat_roughness_factor: factor, clearcoat_roughness_texture: texture, .. }) =
+        &extensions.clearcoat
+    {
+        let coat = interval(*factor, texture.as_ref(), look);
+        ggx = [ggx[0].min(coat[0]), ggx[1].max(coat[1])];
+    }
+    let charlie = extensions.sheen.as_ref().map(|sheen| {
+        let (low, high) = sheen
+            .sheen_roughness_texture
+            .as_ref()
+            .map_or((1.0, 1.0), |info| (unit(look(info).min[3]), unit(look(info).max[3])));
+        [sheen.sheen_roughness_factor * low, sheen.sheen_roughness_factor * high]
+    });
+    LightReads { ggx: Some(ggx), charlie }
+}
+
+/// Least share of its roughness that a refracted lobe keeps, over the colours that dispersion parts: none in a medium like
+/// air, all of it at index 1.5 and above (Khronos sample viewer, `applyIorToRoughness`; KHR_materials_dispersion).
+fn share_refracted(material: &Material) -> f32 {
+    let ior = material.extensions.ior.as_ref().map_or(1.5, |it| it.ior).max(1.0);
+    let dispersion = material.extensions.dispersion.map_or(0.0, |it| it.dispersion);
+    let least = ior - (ior - 1.0) * 0.025 * dispersion;
+    (2.0 * least - 2.0).clamp(0.0, 1.0)
 }
 
 /// Roughness is in the green channel of both textures.

@@ -16,6 +16,7 @@ use kiln_diagnostic::Diagnostic;
 use kiln_image::{Environment, Layout, Panorama, TexelPolicy};
 use serde_json::{Value, json};
 
+use crate::EnvDemand;
 use crate::blob::{decode_environment, environment_size};
 use crate::env_config::{EnvConfig, Range, format_name};
 use crate::plan::{PartSpec, Planner, no_content, rank, unreadable};
@@ -38,77 +39,117 @@ const LEVEL: &str = "level";
 /// The skybox's levels: outputs `levels/mip0` … of its action.
 const LEVELS: &str = "levels";
 
-/// Adds the actions and targets of one environment.
-pub(crate) fn plan_environment(planner: &mut Planner, engine: &Engine, name: &str, env: &EnvConfig) {
+/// Adds the actions and targets of what is read of one environment.
+pub(crate) fn plan_environment(
+    planner: &mut Planner,
+    engine: &Engine,
+    name: &str,
+    env: &EnvConfig,
+    demand: &EnvDemand,
+) {
     let steps = Steps { name, env };
     let decode = planner.graph.add(steps.decode(engine));
-    let analyse = planner.graph.add(steps.analyse(decode));
     let skybox = planner.graph.add(steps.skybox(decode));
     for action in [decode, skybox] {
         planner.subjects.insert(action, env.sources[0].clone());
     }
-    let irradiance = planner.graph.add(steps.irradiance(decode, analyse));
-    let sh = planner.graph.add(steps.sh(analyse));
     let target = |map: &str| format!("env/{name}/{map}");
-    let part = |action: ActionId, level: usize| PartSpec::One {
-        action,
-        output: LEVEL.to_owned(),
-        part: format!("mip{level}"),
-    };
     planner.target(target("skybox"), "cube", json!({}), vec![PartSpec::Folder(skybox, LEVELS)]);
-    planner.target(target("sh"), "sh", json!({"order": env.sh_order}), vec![PartSpec::one(sh, "json")]);
     if env.is_sun_extracted {
         let sun = PartSpec::One { action: decode, output: "sun".to_owned(), part: "json".to_owned() };
         planner.target(target("sun"), "light", json!({}), vec![sun]);
     }
-    let count = env.level_count();
-    let chain = |planner: &mut Planner, map: &'static str, lobe: LobeKind| -> Vec<ActionId> {
-        let first = usize::from(lobe == LobeKind::Ggx && env.roughness(0) == 0.0);
-        (first..count)
-            .map(|level| planner.graph.add(steps.level(map, lobe, decode, analyse, level)))
-            .collect()
-    };
-    // Roughness 0 sees the environment itself.
-    let mirror = PartSpec::One { action: skybox, output: MIRROR.to_owned(), part: "mip0".to_owned() };
-    let specular = chain(planner, "specular", LobeKind::Ggx);
-    let sheen = if env.has_sheen { chain(planner, "sheen", LobeKind::Charlie) } else { Vec::new() };
-    // What measures a map, and the map's target knows it too.
-    let mut accuracy = Vec::new();
-    let mut measured = |planner: &mut Planner, map: &'static str, levels: &[ActionId], lobe: LobeOf| {
-        let first = if map == "irradiance" { 0 } else { count - levels.len() };
-        let subject = |(index, &level): (usize, &ActionId)| {
-            let face_size =
-                if map == "irradiance" { env.irradiance_size } else { env.face_size(first + index) };
-            Subject { level, lobe: lobe(env.roughness(first + index)), face_size }
-        };
-        let subjects = levels.iter().enumerate().map(subject).collect();
-        let action = planner.graph.add(steps.measure(map, decode, subjects));
-        accuracy.push(PartSpec::One { action, output: "json".to_owned(), part: map.to_owned() });
+    if !demand.is_light_read() {
+        return;
+    }
+    let mut plan = EnvPlan { planner, steps, decode, skybox, accuracy: Vec::new() };
+    let ggx_levels = EnvDemand::levels(&demand.specular);
+    if !demand.light.is_empty() || !ggx_levels.is_empty() {
+        let analyse = plan.planner.graph.add(plan.steps.analyse(decode, LobeKind::Ggx));
+        if !demand.light.is_empty() {
+            plan.add_light(analyse);
+        }
+        if !ggx_levels.is_empty() {
+            plan.add_chain("specular", LobeKind::Ggx, analyse, ggx_levels);
+        }
+    }
+    if demand.is_sheen_read() {
+        // Apart from the other lobes': what they are made of stays as it is when the first cloth appears.
+        let analyse = plan.planner.graph.add(plan.steps.analyse(decode, LobeKind::Charlie));
+        plan.add_chain("sheen", LobeKind::Charlie, analyse, EnvDemand::levels(&demand.sheen));
+    }
+    let EnvPlan { planner, accuracy, .. } = plan;
+    if !accuracy.is_empty() {
+        planner.target(target("accuracy"), "accuracy", json!({}), accuracy);
+    }
+}
+
+/// An environment's actions as they are added.
+struct EnvPlan<'a, 'p> {
+    planner: &'p mut Planner,
+    steps: Steps<'a>,
+    decode: ActionId,
+    skybox: ActionId,
+    /// What measured the maps so far.
+    accuracy: Vec<PartSpec>,
+}
+
+impl EnvPlan<'_, '_> {
+    /// Irradiance and its harmonics.
+    fn add_light(&mut self, analyse: ActionId) {
+        let Steps { name, env } = self.steps;
+        let irradiance = self.planner.graph.add(self.steps.irradiance(self.decode, analyse));
+        let sh = self.planner.graph.add(self.steps.sh(analyse));
+        let meta = json!({"order": env.sh_order});
+        self.planner.target(format!("env/{name}/sh"), "sh", meta, vec![PartSpec::one(sh, "json")]);
+        let meta = json!({"size": env.irradiance_size, "levels": 1});
+        let subject = Subject { level: irradiance, lobe: Lobe::Lambert, face_size: env.irradiance_size };
+        let facts = self.measure("irradiance", vec![subject]);
+        let parts = vec![level_part(irradiance, 0), facts];
+        self.planner.target(format!("env/{name}/irradiance"), "cube", meta, parts);
+    }
+
+    /// Those levels of a chain that are read.
+    fn add_chain(&mut self, map: &'static str, lobe: LobeKind, analyse: ActionId, levels: std::ops::Range<usize>) {
+        let Steps { name, env } = self.steps;
+        let count = env.level_count();
+        let (mut parts, mut subjects) = (Vec::new(), Vec::new());
+        for level in levels.clone() {
+            let roughness = env.roughness(level);
+            if lobe == LobeKind::Ggx && roughness == 0.0 {
+                // Roughness 0 sees the environment itself.
+                let (output, part) = (MIRROR.to_owned(), format!("mip{level}"));
+                parts.push(PartSpec::One { action: self.skybox, output, part });
+                continue;
+            }
+            let action = self.steps.level(map, lobe, self.decode, analyse, level);
+            let action = self.planner.graph.add(action);
+            parts.push(level_part(action, level));
+            subjects.push(Subject { level: action, lobe: lobe.of()(roughness), face_size: env.face_size(level) });
+        }
+        if !subjects.is_empty() {
+            parts.push(self.measure(map, subjects));
+        }
+        let roughness: Vec<f64> = (0..count).map(|level| env.roughness(level)).collect();
+        let law = env.law.formula();
+        let mut meta = json!({"size": env.size, "levels": count, "law": law, "roughness": roughness});
+        if levels.len() < count {
+            meta["first_level"] = json!(levels.start);
+            meta["levels_of_law"] = json!(count);
+        }
+        self.planner.target(format!("env/{name}/{map}"), "cube", meta, parts);
+    }
+
+    /// Measures a map; its target knows the result, and so does the environment's.
+    fn measure(&mut self, map: &'static str, subjects: Vec<Subject>) -> PartSpec {
+        let action = self.planner.graph.add(self.steps.measure(map, self.decode, subjects));
+        self.accuracy.push(PartSpec::One { action, output: "json".to_owned(), part: map.to_owned() });
         PartSpec::Facts(action)
-    };
-    let meta = json!({"size": env.irradiance_size, "levels": 1});
-    let facts = measured(planner, "irradiance", &[irradiance], |_| Lobe::Lambert);
-    planner.target(target("irradiance"), "cube", meta, vec![part(irradiance, 0), facts]);
-    let law = env.law.formula();
-    let roughness: Vec<f64> = (0..count).map(|level| env.roughness(level)).collect();
-    let meta = json!({"size": env.size, "levels": count, "law": law, "roughness": roughness});
-    let chain_parts = |actions: &[ActionId]| -> Vec<PartSpec> {
-        let first = count - actions.len();
-        let levels = actions.iter().enumerate().map(|(index, action)| part(*action, first + index));
-        let mirror = (first > 0).then(|| mirror.clone());
-        mirror.into_iter().chain(levels).collect()
-    };
-    let mut parts = chain_parts(&specular);
-    if !specular.is_empty() {
-        parts.push(measured(planner, "specular", &specular, LobeKind::Ggx.of()));
     }
-    planner.target(target("specular"), "cube", meta.clone(), parts);
-    if env.has_sheen {
-        let mut parts = chain_parts(&sheen);
-        parts.push(measured(planner, "sheen", &sheen, LobeKind::Charlie.of()));
-        planner.target(target("sheen"), "cube", meta, parts);
-    }
-    planner.target(target("accuracy"), "accuracy", json!({}), accuracy);
+}
+
+fn level_part(action: ActionId, level: usize) -> PartSpec {
+    PartSpec::One { action, output: LEVEL.to_owned(), part: format!("mip{level}") }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -129,6 +170,7 @@ impl LobeKind {
     }
 }
 
+#[derive(Clone, Copy)]
 struct Steps<'a> {
     name: &'a str,
     env: &'a EnvConfig,
@@ -212,19 +254,23 @@ impl Steps<'_> {
         Action { memory: needs(memory), ..action }
     }
 
-    fn analyse(&self, decode: ActionId) -> Action {
-        let roughness: Vec<f64> =
-            (0..self.env.level_count()).map(|level| self.env.roughness(level)).collect();
-        let least = roughness.iter().copied().find(|roughness| *roughness > 0.0).unwrap_or(1.0);
-        let sheen = self.env.has_sheen.then(|| sheen_alpha(roughness[0]));
-        let request =
-            AnalysisRequest { alpha_min: least * least, sheen_alpha_min: sheen, error: self.env.error };
+    /// The transform that all levels of a chain are made of, whichever of them are read: a level's texels do not depend on
+    /// what else is read.
+    fn analyse(&self, decode: ActionId, lobe: LobeKind) -> Action {
+        let roughness = (0..self.env.level_count()).map(|level| self.env.roughness(level));
+        let least = roughness.clone().find(|roughness| *roughness > 0.0).unwrap_or(1.0);
+        let (alpha_min, sheen) = match lobe {
+            LobeKind::Ggx => (least * least, None),
+            LobeKind::Charlie => (1.0, Some(sheen_alpha(self.env.roughness(0)))),
+        };
+        let request = AnalysisRequest { alpha_min, sheen_alpha_min: sheen, error: self.env.error };
         let mut params = json!({"alpha_min": request.alpha_min, "error": request.error});
         if let Some(alpha) = sheen {
             params["sheen_alpha_min"] = json!(alpha);
         }
         let command = command("analyse", 2, params, &["analysis"]);
-        let action = self.action("", command, vec![self.light(decode)], move |inputs| {
+        let step = if lobe == LobeKind::Charlie { "/sheen" } else { "" };
+        let action = self.action(step, command, vec![self.light(decode)], move |inputs| {
             let cancel = cancel(inputs);
             let panorama = panorama(inputs, 0)?;
             let analysis = kiln_bake::analyse(&panorama, &request, cancel).map_err(ended)?;

@@ -233,7 +233,7 @@ fn unlit_ends_every_other_effect() {
         {"KHR_materials_unlit": {}, "KHR_materials_clearcoat": {"clearcoatFactor": 1.0}}});
     let packed = pack_alone(&File::with_material(material).bytes());
     assert_eq!(variant_name(&packed.effects[0].effects), "unlit");
-    assert_eq!(packed.effects[0].roughness, [1.0, 0.0]);
+    assert_eq!(packed.effects[0].reads, crate::LightReads::default());
 }
 
 #[test]
@@ -264,7 +264,25 @@ fn roughness_interval_covers_texture_and_coat() {
     let material = json!({"pbrMetallicRoughness": {"roughnessFactor": 0.5, "metallicRoughnessTexture": {"index": 0}},
         "extensions": {"KHR_materials_clearcoat": {"clearcoatFactor": 1.0, "clearcoatRoughnessFactor": 0.1}}});
     let packed = pack_alone(&File::with_material(material).texture([0, 204, 0, 255]).bytes());
-    super::check_within("roughness", &packed.effects[0].roughness, &[0.1, 0.4], 1e-6);
+    super::check_within("roughness", &packed.effects[0].reads.ggx.unwrap(), &[0.1, 0.4], 1e-6);
+    assert_eq!(packed.effects[0].reads.charlie, None);
+}
+
+#[test]
+fn refracted_light_is_read_sharper_in_thin_media_and_sheen_by_its_own_roughness() {
+    let glass = |ior: f64, dispersion: f64| {
+        json!({"pbrMetallicRoughness": {"roughnessFactor": 0.5, "metallicFactor": 0.0}, "extensions": {
+            "KHR_materials_transmission": {"transmissionFactor": 1.0}, "KHR_materials_ior": {"ior": ior},
+            "KHR_materials_volume": {"thicknessFactor": 1.0}, "KHR_materials_dispersion": {"dispersion": dispersion},
+            "KHR_materials_sheen": {"sheenColorFactor": [1, 1, 1], "sheenRoughnessFactor": 0.8}}})
+    };
+    let reads = |ior, dispersion| {
+        pack_alone(&File::with_material(glass(ior, dispersion)).texture([0, 0, 0, 255]).bytes()).effects[0].reads
+    };
+    super::check_within("window glass", &reads(1.5, 0.0).ggx.unwrap(), &[0.5, 0.5], 1e-6);
+    super::check_within("thin medium", &reads(1.2, 0.0).ggx.unwrap(), &[0.2, 0.5], 1e-6);
+    super::check_within("dispersing medium", &reads(1.2, 4.0).ggx.unwrap(), &[0.18, 0.5], 1e-6);
+    super::check_within("sheen", &reads(1.5, 0.0).charlie.unwrap(), &[0.8, 0.8], 1e-6);
 }
 
 #[test]

@@ -1,0 +1,192 @@
+//! What the scenes of a project call for, and which maps and levels of each environment follow from it.
+//!
+//! A level is made if something reads it, and every level that something reads is made: the interval of roughness that a
+//! material's values and textures give, widened by what the shipped shaders add when they filter normals, plus the
+//! neighbours that a trilinear lookup touches, without gaps. Base size and law never depend on it.
+
+use std::collections::BTreeMap;
+
+use kiln_bake::RoughnessLaw;
+use kiln_scene::{Effect, EffectSet, LightReads, MaterialEffects};
+use serde_json::{Value, json};
+
+use crate::{EnvConfig, Project};
+
+/// What one scene calls for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneDemand {
+    /// Its name.
+    pub name: String,
+    /// The environment that lights it.
+    pub env: String,
+    /// The shader that draws it.
+    pub shader: String,
+    /// Its materials, after `[effects]`.
+    pub materials: Vec<MaterialEffects>,
+}
+
+/// Why something is made, a sentence for each reader; empty if nothing reads it.
+pub type Reasons = Vec<String>;
+
+/// Which maps of an environment are read.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EnvDemand {
+    /// Irradiance and its harmonics.
+    pub light: Reasons,
+    /// Each level of the GGX chain.
+    pub specular: Vec<Reasons>,
+    /// Each level of the Charlie chain.
+    pub sheen: Vec<Reasons>,
+}
+
+/// `[effects]` of kiln.toml: what materials have besides what their values call for, and what they may not have.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EffectOverrides {
+    /// Every material has these.
+    pub force: EffectSet,
+    /// No material has these.
+    pub forbid: EffectSet,
+}
+
+/// Widest that the shipped shaders make a lobe to cover how a normal turns within a pixel, added to α² (`alpha2_filtered`
+/// of shaders/lib/brdf.wgsl; Tokuyoshi and Kaplanyan 2019).
+const FILTERING_ALPHA2: f64 = 0.18;
+
+/// A level that is read by less than this much of a level is not: roughness factors are decimal fractions in binary.
+const LEVEL_SLACK: f64 = 1e-4;
+
+impl EffectOverrides {
+    /// The effects that a material is drawn with.
+    pub fn apply(&self, effects: &EffectSet) -> EffectSet {
+        effects.union(&self.force).filter(|effect| !self.forbid.contains(effect)).copied().collect()
+    }
+
+    /// The same of a material, with what it reads. What is forced has no values to go by: all of its lobe is read.
+    pub(crate) fn apply_to(&self, material: &MaterialEffects) -> MaterialEffects {
+        let effects = self.apply(&material.effects);
+        let LightReads { mut ggx, mut charlie } = material.reads;
+        if self.force.contains(&Effect::Sheen) && charlie.is_none() {
+            charlie = Some([0.0, 1.0]);
+        }
+        if self.forbid.contains(&Effect::Unlit) && ggx.is_none() {
+            ggx = Some([0.0, 1.0]);
+        }
+        if effects.contains(&Effect::Unlit) {
+            (ggx, charlie) = (None, None);
+        }
+        if !effects.contains(&Effect::Sheen) {
+            charlie = None;
+        }
+        MaterialEffects { effects, reads: LightReads { ggx, charlie }, ..material.clone() }
+    }
+
+    /// As targets tell it to whoever draws; `None` if nothing is overridden.
+    pub(crate) fn to_json(&self) -> Option<Value> {
+        (*self != EffectOverrides::default()).then(|| json!({"force": self.force, "forbid": self.forbid}))
+    }
+}
+
+/// What each environment of a project is asked for.
+pub(crate) fn env_demands(project: &Project, scenes: &[SceneDemand]) -> BTreeMap<String, EnvDemand> {
+    let demand = |(name, env): (&String, &EnvConfig)| (name.clone(), env_demand(project, name, env, scenes));
+    project.envs.iter().map(demand).collect()
+}
+
+fn env_demand(project: &Project, name: &str, env: &EnvConfig, scenes: &[SceneDemand]) -> EnvDemand {
+    let count = env.level_count();
+    let mut demand =
+        EnvDemand { light: Vec::new(), specular: vec![Vec::new(); count], sheen: vec![Vec::new(); count] };
+    let every_level =
+        |levels: &mut Vec<Reasons>, reason: &str| levels.iter_mut().for_each(|level| level.push(reason.into()));
+    if env.has_sheen {
+        every_level(&mut demand.sheen, "`sheen = true`");
+    }
+    let is_used = project.scenes.values().any(|scene| scene.env == name);
+    let all = match (env.bakes_all, is_used) {
+        (true, _) => Some("`bake = \"all\"`"),
+        (false, false) => Some("no scene is lit by it, so none says what it needs"),
+        (false, true) => None,
+    };
+    if let Some(reason) = all {
+        demand.light.push(reason.to_owned());
+        every_level(&mut demand.specular, reason);
+    }
+    if env.background_blur > 0.0 {
+        let reason = format!("`background_blur = {}`", env.background_blur);
+        for level in read_levels(env, [0.0, env.background_blur]) {
+            demand.specular[level].push(reason.clone());
+        }
+    }
+    for scene in scenes.iter().filter(|scene| scene.env == name) {
+        for material in &scene.materials {
+            let who = format!("scene/{}: {}", scene.name, material.material);
+            if let Some([low, high]) = material.reads.ggx.map(|interval| interval.map(f64::from)) {
+                demand.light.push(who.clone());
+                let widest = filtered(high);
+                let reason = format!("{who}, {}, filtered up to {widest:.2}", interval_text("roughness", low, high));
+                for level in read_levels(env, [low, widest]) {
+                    demand.specular[level].push(reason.clone());
+                }
+            }
+            if let Some([low, high]) = material.reads.charlie.map(|interval| interval.map(f64::from)) {
+                let reason = format!("{who}, {}", interval_text("sheen roughness", low, high));
+                for level in read_levels(env, [low, high]) {
+                    demand.sheen[level].push(reason.clone());
+                }
+            }
+        }
+    }
+    [&mut demand.specular, &mut demand.sheen].into_iter().for_each(|chain| close_gaps(chain));
+    demand
+}
+
+/// Textures and their files have no gaps between levels.
+fn close_gaps(chain: &mut [Reasons]) {
+    let is_read = |reasons: &Reasons| !reasons.is_empty();
+    let (Some(first), Some(last)) = (chain.iter().position(is_read), chain.iter().rposition(is_read)) else { return };
+    for level in &mut chain[first..=last] {
+        if level.is_empty() {
+            level.push("it lies between levels that are read".to_owned());
+        }
+    }
+}
+
+fn interval_text(what: &str, low: f64, high: f64) -> String {
+    if (high - low).abs() < 1e-6 { format!("{what} {low:.2}") } else { format!("{what} {low:.2} to {high:.2}") }
+}
+
+/// The roughness that filtering of normals makes of a roughness at most.
+fn filtered(roughness: f64) -> f64 {
+    (roughness.powi(4) + FILTERING_ALPHA2).min(1.0).sqrt().sqrt()
+}
+
+/// The levels that trilinear lookups of an interval of roughness touch: by the chain's law, and by the linear one of the
+/// preview's shaders.
+fn read_levels(env: &EnvConfig, [low, high]: [f64; 2]) -> std::ops::RangeInclusive<usize> {
+    let count = env.level_count();
+    let level = |law: &RoughnessLaw, roughness: f64| law.level(roughness, count);
+    let laws = [&env.law, &RoughnessLaw::Linear];
+    let first = laws.map(|law| level(law, low) + LEVEL_SLACK).into_iter().fold(f64::INFINITY, f64::min);
+    let last = laws.map(|law| level(law, high) - LEVEL_SLACK).into_iter().fold(0.0, f64::max);
+    let (first, last) = (first.floor() as usize, last.ceil().max(0.0) as usize);
+    first.min(count - 1)..=last.max(first).min(count - 1)
+}
+
+impl EnvDemand {
+    /// Whether anything but the skybox is read.
+    pub fn is_light_read(&self) -> bool {
+        [&self.specular, &self.sheen].into_iter().flatten().any(|level| !level.is_empty()) || !self.light.is_empty()
+    }
+
+    /// Whether any level of the Charlie chain is read.
+    pub fn is_sheen_read(&self) -> bool {
+        self.sheen.iter().any(|level| !level.is_empty())
+    }
+
+    /// The levels of a chain that are read: a range.
+    pub fn levels(chain: &[Reasons]) -> std::ops::Range<usize> {
+        let is_read = |reasons: &Reasons| !reasons.is_empty();
+        let first = chain.iter().position(is_read).unwrap_or(0);
+        first..chain.iter().rposition(is_read).map_or(first, |last| last + 1)
+    }
+}
