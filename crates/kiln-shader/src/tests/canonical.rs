@@ -208,6 +208,19 @@ fn halves_are_packed_without_optional_features() {
 }
 
 #[test]
+fn arithmetic_of_halves_is_refused_as_optional() {
+    let text = "enable f16;
+        @fragment fn fs_main(@location(0) x: f32) -> @location(0) vec4f { return vec4f(f32(f16(x))); }";
+    let outcome = Files::new(&[("a.wgsl", text)]).compile("a.wgsl", &[]);
+    assert!(outcome.compiled.is_none());
+    assert!(
+        format!("{:?}", outcome.diagnostics[0].help).contains("optional features"),
+        "{:?}",
+        outcome.diagnostics
+    );
+}
+
+#[test]
 fn storage_textures_and_depth_are_reflected() {
     let reflection = compile_one(
         "@group(0) @binding(0) var out: texture_storage_2d_array<rgba16float, write>;
