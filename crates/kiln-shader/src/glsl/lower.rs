@@ -10,12 +10,14 @@ use super::builtin;
 use super::check;
 use super::declare::{self, Block, Function, Item, Variable};
 use super::effects;
+use super::index;
 use super::lazy;
 use super::lex::{Kind, Token};
 use super::locations::{self, Interface, Passed};
 use super::order;
 use super::padding;
-use super::rewrite::{Meaning, Member, Rewriter, Scene, Stored};
+use super::rewrite::Rewriter;
+use super::scene::{Scene, scene, stored_type};
 use super::source::{Mapped, Place, Sources};
 use super::switch;
 use crate::Stage;
@@ -85,117 +87,6 @@ struct Writer<'a, 's, 'r> {
     prologue: Mapped,
     /// What is done after it.
     epilogue: Mapped,
-}
-
-/// Names that are written otherwise, and what else a function's text means.
-fn scene(stage: &Parsed) -> Scene {
-    let mut scene = Scene {
-        stage: stage.stage,
-        meanings: BTreeMap::new(),
-        structs: BTreeSet::new(),
-        functions: BTreeSet::new(),
-        textured: BTreeSet::new(),
-        polyfills: BTreeMap::new(),
-        unsized_members: BTreeSet::new(),
-    };
-    for name in ["gl_VertexID", "gl_VertexIndex", "gl_InstanceID", "gl_InstanceIndex"] {
-        let texts = builtin::variable(name).unwrap_or_default().iter().map(|text| (*text).to_owned());
-        scene.meanings.insert(name.to_owned(), Meaning::Expression(texts.collect()));
-    }
-    let mut size = [1_u32; 3];
-    for item in &stage.items {
-        match item {
-            Item::Struct(structure) => drop(scene.structs.insert(Rc::clone(&structure.name.text))),
-            Item::Function(function) => {
-                scene.functions.insert(Rc::clone(&function.name.text));
-                let mut tokens = function.parameters.iter().flatten();
-                if tokens.any(|token| builtin::combined(&token.text).is_some()) {
-                    scene.textured.insert(Rc::clone(&function.name.text));
-                }
-            }
-            Item::Variable(variable) if variable.qualifiers.is("uniform") => {
-                let name = variable.name.text.to_string();
-                if let Some(combined) = builtin::combined(&variable.ty.text) {
-                    let sampler = bindings::sampler_name(variable, &combined);
-                    scene.meanings.insert(name, Meaning::Texture(combined, sampler));
-                } else if let (_, Some(stored)) = stored_type(variable) {
-                    scene.meanings.insert(name, Meaning::Stored(stored));
-                }
-            }
-            Item::Block(block) => {
-                block_meanings(&mut scene, stage, block);
-                let members = block.members.iter().filter(|member| member.is_unsized());
-                scene.unsized_members.extend(members.map(|member| Rc::clone(&member.name.text)));
-            }
-            Item::Qualifiers(qualifiers, _) => {
-                for (axis, name) in ["local_size_x", "local_size_y", "local_size_z"].iter().enumerate() {
-                    size[axis] = qualifiers.integer(name).unwrap_or(size[axis]);
-                }
-            }
-            _ => {}
-        }
-    }
-    let [x, y, z] = size.map(|count| format!("{count}u"));
-    let texts = ["uvec3", "(", &x, ",", &y, ",", &z, ")"].map(str::to_owned).to_vec();
-    scene.meanings.insert("gl_WorkGroupSize".to_owned(), Meaning::Expression(texts));
-    scene
-}
-
-fn block_meanings(scene: &mut Scene, stage: &Parsed, block: &Block) {
-    let is_passed = locations::direction(&block.qualifiers, stage.stage).is_some();
-    let is_uniform = block.qualifiers.is("uniform");
-    let is_flat = block.is_flattened();
-    let mut members = BTreeMap::new();
-    for member in &block.members {
-        let name = member.name.text.to_string();
-        if is_passed || is_flat {
-            members.insert(name, Member::Renamed(locations::member_name(&block.name, &member.name)));
-        } else if let (_, Some(stored)) = stored_type(member)
-            && is_uniform
-        {
-            if block.instance.is_none() {
-                scene.meanings.insert(name, Meaning::Stored(stored));
-            } else {
-                members.insert(name, Member::Stored(stored));
-            }
-        }
-    }
-    if let Some(instance) = &block.instance
-        && !members.is_empty()
-    {
-        scene.meanings.insert(instance.text.to_string(), Meaning::Instance(members));
-    }
-}
-
-/// The type that a uniform is stored as, and how its uses are written if that is another.
-fn stored_type(variable: &Variable) -> (String, Option<Stored>) {
-    let ty = &*variable.ty.text;
-    let is_array = !variable.array.is_empty();
-    let len =
-        builtin::vector_len(ty).or_else(|| matches!(ty, "float" | "int" | "uint" | "bool").then_some(1));
-    let Some(len) = len else { return (ty.to_owned(), None) };
-    let is_flag = ty.starts_with('b');
-    let kind = match ty.as_bytes().first() {
-        Some(b'b' | b'u') => "u",
-        Some(b'i') => "i",
-        _ => "",
-    };
-    let swizzle = match len {
-        1 => Some("x"),
-        2 => Some("xy"),
-        3 if is_flag => Some("xyz"),
-        _ => None,
-    };
-    let stored = Stored { swizzle: swizzle.filter(|_| is_array), flags: is_flag.then_some(len) };
-    if stored == Stored::default() {
-        return (ty.to_owned(), None);
-    }
-    let stored_len = if is_array { 4 } else { len };
-    let name = match (stored_len, kind) {
-        (1, _) => "uint".to_owned(),
-        (len, kind) => format!("{kind}vec{len}"),
-    };
-    (name, Some(stored))
 }
 
 /// Appends tokens with space between.
@@ -299,7 +190,8 @@ impl Writer<'_, '_, '_> {
             let message = format!("`{}` is initialised with a list", variable.name.text);
             return self.report(initial[0].place, message, "write a constructor, as in `float[2](1.0, 2.0)`");
         }
-        let initial = lazy::lower(self.sources, &self.effects, initial);
+        index::check(self.sources, &self.effects, initial);
+        let initial = lazy::lower(&self.effects, initial);
         let value = Rewriter::new(self.sources, &mut self.scene, None).tokens(&initial);
         let mark = |text: &str| Token::new(Kind::Mark, text, variable.place());
         let assignment = [variable.name.clone(), mark("=")].into_iter().chain(value).chain([mark(";")]);
@@ -396,7 +288,7 @@ impl Writer<'_, '_, '_> {
         };
         let text = format!("layout({layout}) uniform {} {name};\n", combined.texture);
         self.globals.push(&text, place);
-        let sampler = bindings::sampler_name(variable, &combined);
+        let sampler = bindings::sampler_name(&variable.name.text, &combined);
         if self.samplers.insert(sampler.clone()) {
             let layout = self.layout(&sampler);
             let text = format!("layout({layout}) uniform {} {sampler};\n", combined.sampler);
@@ -531,7 +423,8 @@ impl Writer<'_, '_, '_> {
         let mut rewriter = Rewriter::new(self.sources, &mut self.scene, returned);
         let parameters: Vec<Vec<Token>> =
             function.parameters.iter().map(|parameter| rewriter.parameter(parameter)).collect();
-        let body = function.body.as_ref().map(|body| lazy::lower(rewriter.sources, &self.effects, body));
+        let body = function.body.as_ref().map(|body| index::lower(rewriter.sources, &self.effects, body));
+        let body = body.map(|body| lazy::lower(&self.effects, &body));
         let body = body.map(|body| switch::without_fall_through(rewriter.sources, &body));
         let body = body.map(|body| rewriter.tokens(&body));
         put(&mut self.functions, &result);
@@ -566,6 +459,9 @@ impl Writer<'_, '_, '_> {
         text.append(self.globals);
         for (name, place) in self.scene.polyfills {
             text.push(&builtin::polyfill(name).unwrap_or_default(), place);
+        }
+        for selector in self.scene.selectors.values() {
+            text.push(&selector.text, selector.place);
         }
         text.append(self.functions);
         if wraps_main {

@@ -34,6 +34,7 @@ mod effects;
 mod explain;
 mod extension;
 mod include;
+mod index;
 mod inout;
 mod join;
 mod lazy;
@@ -46,11 +47,14 @@ mod order;
 mod padding;
 mod preprocess;
 mod rewrite;
+mod scene;
 mod source;
 mod stage;
 mod stage_module;
 mod statement;
 mod switch;
+mod texture;
+mod texture_array;
 
 /// A stage after preprocessing.
 #[derive(Debug)]
@@ -61,6 +65,8 @@ struct Parsed {
     tokens: Vec<Token>,
     items: Vec<Item>,
     counts: BTreeMap<Rc<str>, usize>,
+    /// How many textures each array of them has; the items hold its elements.
+    texture_arrays: BTreeMap<Rc<str>, usize>,
 }
 
 impl Parsed {
@@ -70,7 +76,7 @@ impl Parsed {
             *counts.entry(Rc::clone(&token.text)).or_insert(0) += 1;
         }
         let items = declare::parse(&tokens);
-        Parsed { stage, root, tokens, items, counts }
+        Parsed { stage, root, tokens, items, counts, texture_arrays: BTreeMap::new() }
     }
 
     /// How often a word stands in the stage.
@@ -163,7 +169,8 @@ fn load(
         }
         let tokens = preprocessed.tokens;
         if nesting::check_characters(sources, &tokens) && nesting::check_nesting(sources, &tokens) {
-            let parsed = Parsed::new(stage, root, tokens);
+            let mut parsed = Parsed::new(stage, root, tokens);
+            texture_array::expand(sources, &mut parsed);
             if nesting::check_count(sources, &parsed) {
                 stages.push(parsed);
             }
