@@ -253,6 +253,23 @@ pub fn image_format(sources: &mut Sources<'_, '_>, variable: &Variable) {
     }
 }
 
+/// Checks that a separate texture is compared or read, but not both: the two are of different types.
+pub fn comparison(sources: &mut Sources<'_, '_>, stage: &Parsed, variable: &Variable) {
+    if !variable.ty.text.contains("texture") {
+        return;
+    }
+    let uses = stage.tokens.windows(3).filter(|join| join[1].is("(") && join[2].text == variable.name.text);
+    let joined = uses.filter_map(|join| Some((&join[0], builtin::combined(&join[0].text)?.sampler)));
+    let (compared, read): (Vec<_>, Vec<_>) = joined.partition(|(_, sampler)| *sampler == "samplerShadow");
+    if let (Some((first, _)), Some((other, _))) = (read.first(), compared.first()) {
+        let message = format!("`{}` is read here, and compared elsewhere", variable.name.text);
+        let mut fault = sources.error(first.place, message);
+        fault.notes.insert(0, format!("compared at {}", sources.describe(other.place)));
+        let help = "declare a second texture for the comparison, and give both the same image";
+        sources.diagnostics.push(fault.with_help(help));
+    }
+}
+
 /// How an image is accessed: as declared, else by what is done with it.
 pub fn image_access(sources: &mut Sources<'_, '_>, stage: &Parsed, variable: &Variable) -> &'static str {
     let is_image = variable.ty.text.contains("image");

@@ -10,6 +10,7 @@ use super::effects;
 use super::lazy;
 use super::lex::{self, Kind, Token};
 use super::source::{Place, Sources};
+use super::statement;
 
 /// Most indices of a function that get a variable.
 const INDICES_MAX: usize = 256;
@@ -84,11 +85,11 @@ impl Update {
         }
         let is_prefix = is_step && tokens.get(at + 1).is_some_and(Token::is_word);
         let (place, all) = if is_prefix {
-            let end = place_end(tokens, at + 1);
+            let end = statement::place_end(tokens, at + 1);
             (at + 1..end, at..end)
         } else {
-            let start = place_start(tokens, at);
-            let end = if is_step { at + 1 } else { value_end(tokens, at + 1) };
+            let start = statement::place_start(tokens, at);
+            let end = if is_step { at + 1 } else { statement::value_end(tokens, at + 1) };
             (start..at, start..end)
         };
         let mut indices = Vec::new();
@@ -131,50 +132,4 @@ impl Update {
         out.push(mark(")", place));
         out
     }
-}
-
-/// Index after the name at `at` and all members and elements that follow.
-fn place_end(tokens: &[Token], at: usize) -> usize {
-    let mut end = at + 1;
-    while let Some(token) = tokens.get(end) {
-        match &*token.text {
-            "." => end += 2,
-            "[" => end = lex::closing(tokens, end).map_or(tokens.len(), |close| close + 1),
-            _ => break,
-        }
-    }
-    end.min(tokens.len())
-}
-
-/// Where the variable begins whose member or element ends before `end`.
-fn place_start(tokens: &[Token], end: usize) -> usize {
-    let mut start = end;
-    while let Some(before) = start.checked_sub(1) {
-        let follows = start == end || tokens[start].is(".") || tokens[start].is("[");
-        match &*tokens[before].text {
-            "]" if follows => start = lex::opening(tokens, before).unwrap_or(0),
-            "." if tokens[start].is_word() => start = before,
-            _ if follows && tokens[before].is_word() => start = before,
-            _ => break,
-        }
-    }
-    start
-}
-
-/// Index after the value that begins at `at`: assignments bind looser than `?:` and tighter than commas.
-fn value_end(tokens: &[Token], at: usize) -> usize {
-    let mut choices = 0_usize;
-    let mut end = at;
-    while let Some(token) = tokens.get(end) {
-        match &*token.text {
-            "(" | "[" | "{" => end = lex::closing(tokens, end).unwrap_or(tokens.len()),
-            ")" | "]" | "}" | "," | ";" => break,
-            "?" => choices += 1,
-            ":" if choices == 0 => break,
-            ":" => choices -= 1,
-            _ => {}
-        }
-        end += 1;
-    }
-    end.min(tokens.len())
 }

@@ -11,6 +11,7 @@ use super::check;
 use super::declare::{self, Block, Function, Item, Variable};
 use super::effects;
 use super::index;
+use super::initial;
 use super::lazy;
 use super::lex::{Kind, Token};
 use super::locations::{self, Interface, Passed};
@@ -20,6 +21,7 @@ use super::rewrite::Rewriter;
 use super::scene::{Scene, scene, stored_type};
 use super::source::{Mapped, Place, Sources};
 use super::switch;
+use super::typed;
 use crate::Stage;
 use crate::names::{GROUPS, Group};
 
@@ -215,10 +217,10 @@ impl Writer<'_, '_, '_> {
 
     fn constant(&mut self, variable: &Variable) {
         let initial = variable.initial.clone().unwrap_or_default();
-        let is_runtime = initial.windows(2).any(|pair| {
+        let is_runtime = initial.windows(2).enumerate().any(|(at, pair)| {
             let name = &pair[0];
             let is_type = builtin::is_value_type(&name.text) || self.scene.structs.contains(&name.text);
-            name.is_word() && pair[1].is("(") && !is_type
+            name.is_word() && pair[1].is("(") && (!is_type || typed::is_matrix_of_one(&initial, at))
         }) || initial.iter().any(|token| self.runtime.contains(&token.text));
         if is_runtime && variable.qualifiers.layout.is_empty() {
             self.runtime.insert(Rc::clone(&variable.name.text));
@@ -252,9 +254,10 @@ impl Writer<'_, '_, '_> {
             }
             return self.opaque(variable);
         }
-        if let Some(initial) = variable.initial.as_ref().and_then(|initial| initial.first()) {
+        let initial = variable.initial.as_ref().and_then(|initial| initial.first());
+        if let Some(initial) = initial.filter(|_| initial::value(variable).is_none()) {
             let message = format!("the initial value of `{name}` is not kept");
-            let help = "WGSL has no initial values of uniforms: set it from outside, or make it a `const`";
+            let help = "a number or vector of literals is kept, unless Kiln fills the uniform by its name; or make it a `const`";
             let warning = self.sources.warning(initial.place, message).with_help(help);
             self.sources.diagnostics.push(warning);
         }
@@ -281,6 +284,7 @@ impl Writer<'_, '_, '_> {
             let format = variable.qualifiers.layout.iter().find(|layout| check::is_format(&layout.name.text));
             let format = format.map_or(String::new(), |format| format!("{}, ", format.name.text));
             check::image_format(self.sources, variable);
+            check::comparison(self.sources, self.stage, variable);
             let access = check::image_access(self.sources, self.stage, variable);
             self.globals.push(&format!("layout({format}{layout}) {access} uniform "), place);
             put(&mut self.globals, &[variable.ty.clone(), variable.name.clone()]);
@@ -460,8 +464,8 @@ impl Writer<'_, '_, '_> {
         for (name, place) in self.scene.polyfills {
             text.push(&builtin::polyfill(name).unwrap_or_default(), place);
         }
-        for selector in self.scene.selectors.values() {
-            text.push(&selector.text, selector.place);
+        for helper in &self.scene.helpers {
+            text.push(&helper.text, helper.place);
         }
         text.append(self.functions);
         if wraps_main {

@@ -35,6 +35,7 @@ mod explain;
 mod extension;
 mod include;
 mod index;
+mod initial;
 mod inout;
 mod join;
 mod lazy;
@@ -55,6 +56,8 @@ mod statement;
 mod switch;
 mod texture;
 mod texture_array;
+mod typed;
+mod types;
 
 /// A stage after preprocessing.
 #[derive(Debug)]
@@ -93,7 +96,10 @@ pub fn compile(program: &Program, features: &BTreeSet<String>, lints: bool, read
     let stages = load(&mut sources, program, features, &mut named);
     let mut compiled = if has_errors(&sources) { None } else { translate(&mut sources, &stages, lints) };
     if let Some(compiled) = &mut compiled {
-        let annotations = annotations(&mut sources);
+        let mut annotations = annotations(&mut sources);
+        for (variable, value) in initial::values(&stages) {
+            parameter::give_first(&mut annotations, &variable.name.text, variable.ty.is("bool"), value);
+        }
         compiled.reflection.parameters = parameter::parameters(&compiled.reflection, annotations);
     }
     let Sources { dependencies, diagnostics: found, .. } = sources;

@@ -8,18 +8,20 @@ use kiln_diagnostic::Diagnostic;
 
 use super::builtin::{self, Combined};
 use super::declare::{self, DROPPED};
+use super::lazy;
 use super::lex::{self, Kind, Token};
 use super::scene::{Meaning, Member, Scene, Stored};
 use super::source::{Place, Sources};
 use super::statement;
 use super::texture::Parts;
+use super::types::Type;
 use crate::Stage;
 
 /// What a local name is.
 #[derive(Clone, Debug)]
 pub(super) enum Local {
-    /// A value.
-    Plain,
+    /// A value of some type.
+    Value(Type),
     /// A combined texture, with the name of its sampler.
     Texture(Combined, String),
     /// An array of them.
@@ -33,7 +35,7 @@ pub struct Rewriter<'a, 's, 'r> {
     pub(super) scene: &'a mut Scene,
     scopes: Vec<BTreeMap<Rc<str>, Local>>,
     /// Locals whose name holds from some token on.
-    pending: BTreeMap<usize, Vec<Rc<str>>>,
+    pending: BTreeMap<usize, Vec<(Rc<str>, Type)>>,
     /// Index after a `for` statement, where its scope ends.
     loops: Vec<usize>,
     /// What is called by each open parenthesis.
@@ -44,6 +46,8 @@ pub struct Rewriter<'a, 's, 'r> {
     pub(super) instead: BTreeMap<usize, Vec<Token>>,
     result: Option<Rc<str>>,
     pub(super) out: Vec<Token>,
+    /// Where in `out` each token begins.
+    pub(super) written: Vec<usize>,
 }
 
 /// Tokens that Kiln writes, on behalf of `place`.
@@ -73,6 +77,7 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
             instead: BTreeMap::new(),
             result,
             out: Vec::new(),
+            written: Vec::new(),
         }
     }
 
@@ -100,13 +105,19 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
         if let Some(combined) = builtin::combined(&kept[at].text) {
             return self.texture_parameter(&kept, at, &combined);
         }
-        if let Some(name) = name {
-            self.declare(&name.text, Local::Plain);
-        }
         let of_type = declare::array_len(rest);
         let end = rest.len().min(of_type + 1);
+        if let Some(name) = name {
+            let ty = Type::new(&kept[at].text, &[&rest[end..], &rest[..of_type]].concat());
+            self.declare(&name.text, Local::Value(ty));
+        }
         let arrays = (declare::reversed(&rest[..of_type]), declare::reversed(&rest[end..]));
         [&kept[..=at], &arrays.0, &rest[of_type..end], &arrays.1].concat()
+    }
+
+    /// Adds text before token `at`, after what is written there. What is inner was opened later and closes first.
+    pub(super) fn close(&mut self, at: usize, texts: &[&str], place: Place) {
+        self.before.entry(at).or_default().splice(0..0, tokens_of(texts, place));
     }
 
     pub(super) fn declare(&mut self, name: &Rc<str>, local: Local) {
@@ -128,12 +139,13 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
                 }
                 *end > at
             });
-            for name in self.pending.remove(&at).unwrap_or_default() {
-                self.declare(&name, Local::Plain);
+            for (name, ty) in self.pending.remove(&at).unwrap_or_default() {
+                self.declare(&name, Local::Value(ty));
             }
             if let Some(before) = self.before.remove(&at) {
                 self.out.extend(before);
             }
+            self.written.push(self.out.len());
             match self.instead.remove(&at) {
                 Some(instead) => self.out.extend(instead),
                 None => self.token(tokens, at),
@@ -165,6 +177,8 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
                     format!("write `{single}`: there are no doubles in WGSL"),
                 );
             }
+            ("==" | "!=", _) if self.comparison(tokens, at) => return,
+            (text, _) if lazy::is_assignment(text) && self.column_assignment(tokens, at) => return,
             (_, Kind::Word) => return self.word(tokens, at),
             _ => {}
         }
@@ -177,14 +191,6 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
         let is_call = tokens.get(at + 1).is_some_and(|next| next.is("("));
         let text = &*token.text;
         if after_dot {
-            let array = at.checked_sub(2).map(|array| &tokens[array]);
-            if text == "length"
-                && is_call
-                && let Some(array) = array.filter(|array| self.scene.unsized_members.contains(&array.text))
-            {
-                let message = format!("the length of the buffer array `{}` is not supported", array.text);
-                self.report(array.place.to(token.place), message, "pass the count in a uniform");
-            }
             self.out.push(token.clone());
             return;
         }
@@ -204,6 +210,8 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
         }
         if self.is_declaration(tokens, at) {
             self.declaration(tokens, at);
+        } else if let Some(call) = self.matrix_of_vector(tokens, at) {
+            return self.out.push(call);
         } else if self.is_type(text) {
             // A constructor of an array.
             self.reverse(tokens, at + 1);
@@ -222,7 +230,7 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
             match local {
                 Local::Texture(combined, sampler) => self.texture(tokens, at, &combined, &sampler),
                 Local::Textures(combined, elements) => self.textures(tokens, at, &combined, &elements),
-                Local::Plain => return false,
+                Local::Value(_) => return false,
             }
             return true;
         }
@@ -389,7 +397,10 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
             self.reverse(tokens, name + 1);
             let end = statement::declarator_end(tokens, name);
             self.instead.insert(name, vec![tokens[name].clone()]);
-            self.pending.entry(end).or_default().push(Rc::clone(&tokens[name].text));
+            let of_name = &tokens[name + 1..][..declare::array_len(&tokens[name + 1..])];
+            let array = [of_name, &tokens[at + 1..][..type_array]].concat();
+            let declared = (Rc::clone(&tokens[name].text), Type::new(&tokens[at].text, &array));
+            self.pending.entry(end).or_default().push(declared);
             if !tokens.get(end).is_some_and(|token| token.is(","))
                 || !tokens.get(end + 1).is_some_and(Token::is_word)
             {

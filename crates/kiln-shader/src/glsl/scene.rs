@@ -10,7 +10,8 @@ use super::declare::{Block, Item, Variable};
 use super::locations;
 use super::source::Place;
 use super::texture::{self, Parts};
-use super::texture_array::{self, Constants, Selector};
+use super::texture_array::{self, Constants};
+use super::types::Types;
 use crate::Stage;
 
 /// How the use of a global name is written for naga.
@@ -59,14 +60,27 @@ pub struct Scene {
     pub functions: BTreeSet<Rc<str>>,
     /// Those that take a combined texture.
     pub textured: BTreeSet<Rc<str>>,
-    /// Members of buffers that are arrays without a length.
-    pub unsized_members: BTreeSet<Rc<str>>,
     /// Functions to define, with the place of their first use.
     pub polyfills: BTreeMap<&'static str, Place>,
     /// Values of global integer constants.
     pub constants: Constants,
-    /// Functions to define that read one of several textures, by what they do.
-    pub selectors: BTreeMap<String, Selector>,
+    /// Names of functions that read one of several textures, by what they do.
+    pub selectors: BTreeMap<String, String>,
+    /// Types of global names.
+    pub types: Types,
+    /// Types whose comparison is defined, and columns whose assignment is.
+    pub compared: BTreeSet<String>,
+    /// Functions to define, each after those it calls.
+    pub helpers: Vec<Helper>,
+}
+
+/// A function that Kiln defines for one it found in use.
+#[derive(Clone, Debug)]
+pub struct Helper {
+    /// Its definitions, one for each way to call it.
+    pub text: String,
+    /// Where it is used first.
+    pub place: Place,
 }
 
 /// Names that are written otherwise, and what else a function's text means.
@@ -78,9 +92,11 @@ pub fn scene(stage: &Parsed) -> Scene {
         functions: BTreeSet::new(),
         textured: BTreeSet::new(),
         polyfills: BTreeMap::new(),
-        unsized_members: BTreeSet::new(),
         constants: texture_array::constants(&stage.items),
         selectors: BTreeMap::new(),
+        types: Types::of(stage),
+        compared: BTreeSet::new(),
+        helpers: Vec::new(),
     };
     for name in ["gl_VertexID", "gl_VertexIndex", "gl_InstanceID", "gl_InstanceIndex"] {
         let texts = builtin::variable(name).unwrap_or_default().iter().map(|text| (*text).to_owned());
@@ -106,11 +122,7 @@ pub fn scene(stage: &Parsed) -> Scene {
                     scene.meanings.insert(name, Meaning::Stored(stored));
                 }
             }
-            Item::Block(block) => {
-                block_meanings(&mut scene, stage, block);
-                let members = block.members.iter().filter(|member| member.is_unsized());
-                scene.unsized_members.extend(members.map(|member| Rc::clone(&member.name.text)));
-            }
+            Item::Block(block) => block_meanings(&mut scene, stage, block),
             Item::Qualifiers(qualifiers, _) => {
                 for (axis, name) in ["local_size_x", "local_size_y", "local_size_z"].iter().enumerate() {
                     size[axis] = qualifiers.integer(name).unwrap_or(size[axis]);

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use naga::front::glsl::{Error, ErrorKind, ExpectedToken, Frontend, Options, TokenValue};
 use naga::valid::{FunctionError, ValidationError};
-use naga::{AddressSpace, Barrier, Block, Expression, Module, Statement, TypeInner};
+use naga::{AddressSpace, Arena, Barrier, Block, Expression, Module, Statement, TypeInner};
 
 use super::{inout, lower, stage};
 use crate::explain::Finding;
@@ -39,7 +39,10 @@ fn run(text: &str, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fau
     };
     name_variables(&mut module, stage, names);
     name_members(&mut module);
-    module.functions.iter_mut().for_each(|(_, function)| repair(&mut function.body));
+    for (_, function) in module.functions.iter_mut() {
+        repair(&mut function.body);
+        measure_in_place(&mut function.expressions);
+    }
     inout::copy_parts(&mut module);
     if let Err(error) = front::validate(&module) {
         let mut finding = front::validation_finding(&module, &error);
@@ -112,6 +115,19 @@ fn name_members(module: &mut Module) {
         }
         if renamed {
             module.types.replace(handle, ty);
+        }
+    }
+}
+
+/// naga loads an array to ask for its length, which none without a length allows: the question goes to its place.
+fn measure_in_place(expressions: &mut Arena<Expression>) {
+    let measured = expressions.iter().filter_map(|(_, expression)| match expression {
+        Expression::ArrayLength(array) => Some(*array),
+        _ => None,
+    });
+    for array in measured.collect::<Vec<_>>() {
+        if let Expression::Load { pointer } = expressions[array] {
+            expressions[array] = expressions[pointer].clone();
         }
     }
 }

@@ -6,8 +6,8 @@ use super::builtin::{self, Combined};
 use super::declare;
 use super::lex::{self, Token};
 use super::rewrite::{Local, Rewriter, tokens_of};
-use super::scene::Meaning;
-use super::texture_array::{self, Selector};
+use super::scene::{Helper, Meaning};
+use super::texture_array;
 
 /// Names of a texture and its sampler.
 pub type Parts = [String; 2];
@@ -186,14 +186,15 @@ impl Rewriter<'_, '_, '_> {
         let count = elements.len();
         let key = format!("{name} {} {count} {offset}", combined.constructor);
         let written = match self.scene.selectors.get(&key) {
-            Some(selector) => selector.name.clone(),
+            Some(written) => written.clone(),
             None => {
                 let number = self.scene.selectors.len();
                 let written = format!("kiln_{number}_{name}");
                 let stage = self.scene.stage;
                 let text = texture_array::selector(&written, name, &combined, count, stage, &offset)?;
                 let place = tokens[at].place;
-                self.scene.selectors.insert(key, Selector { name: written.clone(), text, place });
+                self.scene.helpers.push(Helper { text, place });
+                self.scene.selectors.insert(key, written.clone());
                 written
             }
         };

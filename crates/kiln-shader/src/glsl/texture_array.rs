@@ -14,7 +14,7 @@ use super::builtin::{self, Combined};
 use super::condition;
 use super::declare::{Item, Layout, Qualifiers, Variable};
 use super::lex::{Kind, Token};
-use super::source::{Place, Sources};
+use super::source::Sources;
 use crate::Stage;
 
 /// Most elements of an array: devices without optional features have as many textures in a stage.
@@ -186,17 +186,6 @@ pub fn offset_argument(name: &str) -> Option<usize> {
         "textureGrad" => 4,
         _ => 3,
     })
-}
-
-/// A function that looks into one of several textures.
-#[derive(Clone, Debug)]
-pub struct Selector {
-    /// Its name.
-    pub name: String,
-    /// Its definitions, one for each way to call it.
-    pub text: String,
-    /// Where it is used first.
-    pub place: Place,
 }
 
 /// The text of function `written`, which does what `name` does to element `index` of `count` textures. `offset` is
