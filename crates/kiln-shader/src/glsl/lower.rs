@@ -8,19 +8,21 @@ use super::Parsed;
 use super::bindings::{self, Bindings};
 use super::builtin;
 use super::check;
-use super::declare::{self, Block, Function, Item, Variable};
+use super::declare::{self, Block, Function, Item, Qualifiers, Variable};
 use super::effects;
 use super::index;
 use super::initial;
+use super::layout::Moved;
 use super::lazy;
 use super::lex::{Kind, Token};
 use super::locations::{self, Interface, Passed};
 use super::order;
 use super::padding;
 use super::rewrite::Rewriter;
-use super::scene::{Scene, scene, stored_type};
+use super::scene::{self, Scene};
 use super::source::{Mapped, Place, Sources};
 use super::switch;
+use super::texture_array;
 use super::typed;
 use crate::Stage;
 use crate::names::{GROUPS, Group};
@@ -31,6 +33,15 @@ const VERSION: &str = "#version 460 core\n";
 /// The author's `main` where another one calls it: if there is work before or after, as it may return early.
 pub const AUTHORS_MAIN: &str = "kiln_main";
 
+/// A stage as naga reads it.
+#[derive(Debug)]
+pub struct Lowered {
+    /// Its text.
+    pub text: Mapped,
+    /// Members of its blocks that naga is to put elsewhere.
+    pub moved: Vec<Moved>,
+}
+
 /// Writes `stage`; what cannot be written is left in `sources`.
 pub fn lower(
     sources: &mut Sources<'_, '_>,
@@ -38,8 +49,8 @@ pub fn lower(
     interface: &Interface,
     bindings: &Bindings,
     holders: &BTreeMap<Group, String>,
-) -> Mapped {
-    let scene = scene(stage);
+) -> Lowered {
+    let scene = scene::scene(stage);
     let mut writer = Writer {
         sources,
         stage,
@@ -53,6 +64,7 @@ pub fn lower(
         runtime: BTreeSet::new(),
         padded: padding::padded_structs(stage),
         effects: effects::functions(stage),
+        moved: Vec::new(),
         prologue: Mapped::default(),
         epilogue: Mapped::default(),
     };
@@ -85,6 +97,8 @@ struct Writer<'a, 's, 'r> {
     padded: BTreeSet<Rc<str>>,
     /// Functions whose calls may not be left out or made twice.
     effects: BTreeSet<Rc<str>>,
+    /// Members that say where they lie.
+    moved: Vec<Moved>,
     /// What is done before the author's `main`.
     prologue: Mapped,
     /// What is done after it.
@@ -125,7 +139,7 @@ impl Writer<'_, '_, '_> {
             Item::Variable(variable) => self.variable(variable),
             Item::Block(block) => self.block(block),
             Item::Qualifiers(qualifiers, names) => {
-                check::layouts(self.sources, qualifiers);
+                check::default_layouts(self.sources, qualifiers);
                 check::packing(self.sources, self.stage, qualifiers, None);
                 let place = qualifiers.layout.first().map(|layout| layout.name.place);
                 let place = place.or(names.first().map(|name| name.place));
@@ -302,11 +316,7 @@ impl Writer<'_, '_, '_> {
 
     fn block(&mut self, block: &Block) {
         let place = block.name.place;
-        check::layouts(self.sources, &block.qualifiers);
-        let is_pushed = block.qualifiers.layout("push_constant").is_some();
-        for member in &block.members {
-            check::member_layouts(self.sources, &member.qualifiers, is_pushed);
-        }
+        check::block_layouts(self.sources, self.stage, block);
         if locations::direction(&block.qualifiers, self.stage.stage).is_some() {
             return;
         }
@@ -335,6 +345,10 @@ impl Writer<'_, '_, '_> {
             if block.is_flattened() {
                 member.name.text = Rc::from(locations::member_name(&block.name, &member.name));
             }
+            self.note_layout(block, &member);
+            if scene::is_row_major(self.stage, block, &member) {
+                member.ty.text = scene::turned(&member.ty.text).map_or(member.ty.text, Rc::from);
+            }
             self.member(&member, is_uniform);
         }
         self.globals.push("};\n", place);
@@ -345,8 +359,34 @@ impl Writer<'_, '_, '_> {
         }
     }
 
+    /// Notes where a member says that it lies. Push constants become a uniform that is filled by name: stages share one
+    /// block by giving each its part, and where that lies does not matter.
+    fn note_layout(&mut self, block: &Block, member: &Variable) {
+        if block.qualifiers.layout("push_constant").is_some() {
+            return;
+        }
+        let mut said = |name: &str, qualifiers: &Qualifiers| {
+            let layout = qualifiers.layout(name)?;
+            let value = texture_array::value(&layout.value, &self.scene.constants);
+            let value = value.and_then(|value| u32::try_from(value).ok());
+            if value.is_none() {
+                let fault = self.sources.error(layout.name.place, format!("`{name}` is no constant"));
+                self.sources
+                    .diagnostics
+                    .push(fault.with_help("write a literal, or a `const int` that is one"));
+            }
+            value
+        };
+        let offset = said("offset", &member.qualifiers);
+        let align = said("align", &member.qualifiers).or_else(|| said("align", &block.qualifiers));
+        if offset.is_some() || align.is_some() {
+            let [block, member] = [&block.name, &member.name].map(|name| name.text.to_string());
+            self.moved.push(Moved { block, member, offset, align });
+        }
+    }
+
     fn member(&mut self, member: &Variable, is_uniform: bool) {
-        let ty = if is_uniform { stored_type(member).0 } else { member.ty.text.to_string() };
+        let ty = if is_uniform { scene::stored_type(member).0 } else { member.ty.text.to_string() };
         let ty = Token::new(Kind::Word, ty, member.ty.place);
         put(&mut self.globals, &[vec![ty, member.name.clone()], declare::reversed(&member.array)].concat());
         self.globals.push(";\n", member.name.place);
@@ -454,7 +494,7 @@ impl Writer<'_, '_, '_> {
         !(self.prologue.text.is_empty() && self.epilogue.text.is_empty())
     }
 
-    fn finish(self) -> Mapped {
+    fn finish(self) -> Lowered {
         let start = Place { file: self.stage.root, start: 0, end: 0 };
         let mut text = Mapped::default();
         text.push(VERSION, start);
@@ -475,7 +515,7 @@ impl Writer<'_, '_, '_> {
             text.append(self.epilogue);
             text.push("}\n", start);
         }
-        text
+        Lowered { text, moved: self.moved }
     }
 }
 

@@ -38,6 +38,7 @@ mod index;
 mod initial;
 mod inout;
 mod join;
+mod layout;
 mod lazy;
 mod lex;
 mod locations;
@@ -220,7 +221,7 @@ fn translate(sources: &mut Sources<'_, '_>, stages: &[Parsed], lints: bool) -> O
     let interfaces = locations::assign(sources, stages);
     let bound = bindings::assign(sources, stages);
     let holders = lower::holder_names(stages);
-    let texts: Vec<source::Mapped> = stages
+    let texts: Vec<lower::Lowered> = stages
         .iter()
         .zip(&interfaces)
         .map(|(stage, interface)| lower::lower(sources, stage, interface, &bound, &holders))
@@ -234,8 +235,9 @@ fn translate(sources: &mut Sources<'_, '_>, stages: &[Parsed], lints: bool) -> O
     let files = sources.files.iter().map(|file| (file.path.as_str(), &*file.text));
     let allowances = if lints { Allowances::read(files, &mut diagnostics) } else { Allowances::default() };
     sources.diagnostics.append(&mut diagnostics);
-    for (stage, text) in stages.iter().zip(&texts) {
-        let found: Vec<Diagnostic> = match stage_module::translate(&text.text, stage.stage, &names, lints) {
+    for (stage, lowered) in stages.iter().zip(&texts) {
+        let text = &lowered.text;
+        let found: Vec<Diagnostic> = match stage_module::translate(lowered, stage.stage, &names, lints) {
             Ok(Ok((wgsl, warnings))) => {
                 written.push((wgsl, stage::ending(stage.stage)));
                 let warn = |Warning { rule, finding, help }| {

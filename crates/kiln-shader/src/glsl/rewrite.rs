@@ -270,25 +270,29 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
     fn stored(&mut self, tokens: &[Token], first: usize, last: usize, stored: Stored) {
         let place = tokens[first].place.to(tokens[last].place);
         let mut end = last + 1;
-        if tokens.get(end).is_some_and(|next| next.is("[")) {
+        let is_array = stored.swizzle.is_some() || stored.rows == Some(true);
+        if stored.rows != Some(false) && tokens.get(end).is_some_and(|next| next.is("[")) {
             end = lex::closing(tokens, end).map_or(end, |close| close + 1);
-        } else if stored.swizzle.is_some() && !tokens.get(end).is_some_and(|next| next.is(".")) {
-            self.report(
-                place,
-                format!("the array `{}` cannot be used as a whole", tokens[last].text),
-                "use its elements, or declare it as an array of `vec4`",
-            );
+        } else if is_array && !tokens.get(end).is_some_and(|next| next.is(".")) {
+            let help = match stored.rows {
+                Some(_) => "use its elements, or leave `row_major` out",
+                None => "use its elements, or declare it as an array of `vec4`",
+            };
+            let name = &tokens[last].text;
+            self.report(place, format!("the array `{name}` cannot be used as a whole"), help);
         }
         let name: Vec<Token> = tokens[first..=last].to_vec();
         let swizzle = stored.swizzle.map(|swizzle| tokens_of(&[".", swizzle], place)).unwrap_or_default();
         let after = match stored.flags {
             Some(1) => tokens_of(&["!=", "0u", ")"], place),
             Some(count) => tokens_of(&[",", &format!("uvec{count}"), "(", "0u", ")", ")"], place),
+            None if stored.rows.is_some() => tokens_of(&[")"], place),
             None => Vec::new(),
         };
         match stored.flags {
             Some(1) => self.out.extend(tokens_of(&["("], place)),
             Some(_) => self.out.extend(tokens_of(&["notEqual", "("], place)),
+            None if stored.rows.is_some() => self.out.extend(tokens_of(&["transpose", "("], place)),
             None => {}
         }
         self.out.extend(name);

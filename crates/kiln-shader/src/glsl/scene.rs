@@ -6,7 +6,7 @@ use std::rc::Rc;
 use super::Parsed;
 use super::bindings;
 use super::builtin::{self, Combined};
-use super::declare::{Block, Item, Variable};
+use super::declare::{Block, Item, Qualifiers, Variable};
 use super::locations;
 use super::source::Place;
 use super::texture::{self, Parts};
@@ -45,6 +45,8 @@ pub struct Stored {
     pub swizzle: Option<&'static str>,
     /// How many truth values are stored as numbers.
     pub flags: Option<u32>,
+    /// Whether matrices are stored in rows, and whether there is an array of them.
+    pub rows: Option<bool>,
 }
 
 /// What a stage knows while its functions are rewritten.
@@ -157,9 +159,11 @@ fn block_meanings(scene: &mut Scene, stage: &Parsed, block: &Block) {
         let name = member.name.text.to_string();
         if is_passed || is_flat {
             members.insert(name, Member::Renamed(locations::member_name(&block.name, &member.name)));
-        } else if let (_, Some(stored)) = stored_type(member)
-            && is_uniform
-        {
+            continue;
+        }
+        let is_turned = is_row_major(stage, block, member);
+        let turned = is_turned.then(|| Stored { rows: Some(!member.array.is_empty()), ..Stored::default() });
+        if let Some(stored) = turned.or_else(|| stored_type(member).1.filter(|_| is_uniform)) {
             if block.instance.is_none() {
                 scene.meanings.insert(name, Meaning::Stored(stored));
             } else {
@@ -193,7 +197,7 @@ pub fn stored_type(variable: &Variable) -> (String, Option<Stored>) {
         3 if is_flag => Some("xyz"),
         _ => None,
     };
-    let stored = Stored { swizzle: swizzle.filter(|_| is_array), flags: is_flag.then_some(len) };
+    let stored = Stored { swizzle: swizzle.filter(|_| is_array), flags: is_flag.then_some(len), rows: None };
     if stored == Stored::default() {
         return (ty.to_owned(), None);
     }
@@ -203,4 +207,31 @@ pub fn stored_type(variable: &Variable) -> (String, Option<Stored>) {
         (len, kind) => format!("{kind}vec{len}"),
     };
     (name, Some(stored))
+}
+
+/// Whether a member has matrices that its block stores in rows: as it says itself, or its block, or all blocks.
+pub fn is_row_major(stage: &Parsed, block: &Block, member: &Variable) -> bool {
+    let says = |qualifiers: &Qualifiers| {
+        let last = qualifiers.layout.iter().rfind(|layout| layout.name.text.ends_with("_major"));
+        last.map(|layout| layout.name.is("row_major"))
+    };
+    let of_all = || {
+        stage.items.iter().rev().find_map(|item| match item {
+            Item::Qualifiers(qualifiers, _)
+                if block.qualifiers.storage.as_ref().is_some_and(|storage| qualifiers.is(&storage.text)) =>
+            {
+                says(qualifiers)
+            }
+            _ => None,
+        })
+    };
+    let has_matrices =
+        builtin::columns(&member.ty.text).is_some() || !builtin::is_value_type(&member.ty.text);
+    has_matrices
+        && says(&member.qualifiers).or_else(|| says(&block.qualifiers)).or_else(of_all).unwrap_or(false)
+}
+
+/// The type that holds the rows of a matrix as columns.
+pub fn turned(ty: &str) -> Option<String> {
+    Some(format!("mat{}x{}", builtin::rows(ty)?, builtin::columns(ty)?))
 }

@@ -7,7 +7,8 @@ use naga::front::glsl::{Error, ErrorKind, ExpectedToken, Frontend, Options, Toke
 use naga::valid::{FunctionError, ValidationError};
 use naga::{AddressSpace, Arena, Barrier, Block, Expression, Module, Statement, TypeInner};
 
-use super::{inout, lower, stage};
+use super::lower::Lowered;
+use super::{inout, layout, lower, stage};
 use crate::explain::Finding;
 use crate::front::{self, Fault};
 use crate::lint::{self, Warning};
@@ -20,8 +21,8 @@ pub type Made = Result<(String, Vec<Warning>), Vec<Finding>>;
 pub type Names = BTreeMap<(u32, u32), String>;
 
 /// Translates a stage; with `lints`, also says what is doubtful.
-pub fn translate(text: &str, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fault> {
-    match front::on_deep_stack(Fault::Internal, || run(text, stage, names, lints)) {
+pub fn translate(lowered: &Lowered, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fault> {
+    match front::on_deep_stack(Fault::Internal, || run(lowered, stage, names, lints)) {
         // naga's GLSL front end panics where its WGSL front end says where the type is.
         Err(Fault::Internal(panic)) if panic.contains("LayoutError") && panic.contains("TooLarge") => {
             let message = "an array or struct has 2 GiB or more".to_owned();
@@ -31,12 +32,17 @@ pub fn translate(text: &str, stage: Stage, names: &Names, lints: bool) -> Result
     }
 }
 
-fn run(text: &str, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fault> {
+fn run(lowered: &Lowered, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fault> {
+    let text = &*lowered.text.text;
     let options = Options::from(stage::for_naga(stage));
     let mut module = match Frontend::default().parse(&options, text) {
         Ok(module) => module,
         Err(errors) => return Ok(Err(errors.errors.iter().map(|error| finding(text, error)).collect())),
     };
+    let misplaced = layout::apply(&mut module, text, &lowered.moved);
+    if !misplaced.is_empty() {
+        return Ok(Err(misplaced));
+    }
     name_variables(&mut module, stage, names);
     name_members(&mut module);
     for (_, function) in module.functions.iter_mut() {
