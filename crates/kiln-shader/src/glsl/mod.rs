@@ -54,6 +54,7 @@ mod source;
 mod stage;
 mod stage_module;
 mod statement;
+mod stride;
 mod switch;
 mod texture;
 mod texture_array;

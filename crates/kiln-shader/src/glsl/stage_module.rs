@@ -8,7 +8,7 @@ use naga::valid::{FunctionError, ValidationError};
 use naga::{AddressSpace, Arena, Barrier, Block, Expression, Module, Statement, TypeInner};
 
 use super::lower::Lowered;
-use super::{inout, layout, lower, stage};
+use super::{inout, layout, lower, stage, stride};
 use crate::explain::Finding;
 use crate::front::{self, Fault};
 use crate::lint::{self, Warning};
@@ -39,6 +39,7 @@ fn run(lowered: &Lowered, stage: Stage, names: &Names, lints: bool) -> Result<Ma
         Ok(module) => module,
         Err(errors) => return Ok(Err(errors.errors.iter().map(|error| finding(text, error)).collect())),
     };
+    stride::close_gaps(&mut module);
     let misplaced = layout::apply(&mut module, text, &lowered.moved);
     if !misplaced.is_empty() {
         return Ok(Err(misplaced));
