@@ -1,7 +1,7 @@
 #version 450
 layout(local_size_x = 8) in;
 layout(std430, set = 0, binding = 0) buffer Data { int ints[128]; float floats[128]; };
-// Another program: `m[2].yx *= 2.0;` => `m[2].xy *= 2.0;`
+// Another program: `m[2].zxy - m[at]` => `m[2].zyx - m[at]`
 vec4 row(mat4 m, int i) { return vec4(m[0][i], m[1][i], m[2][i], m[3][i]); }
 void main() {
     int base = int(gl_GlobalInvocationID.x) * 16;

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use kiln_gpu::Gpu;
 
@@ -88,17 +89,21 @@ fn kilns(gpu: &Gpu, name: &str, text: &str) -> (wgpu::ShaderModule, &'static str
 #[track_caller]
 #[expect(unsafe_code, reason = "no other compiler may stand between glslang and the driver")]
 fn glslangs(gpu: &Gpu, name: &str, text: &str) -> (wgpu::ShaderModule, &'static str) {
-    let [source, made] = ["comp", "spv"].map(|end| {
-        Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}-{}.{end}", std::process::id()))
-    });
+    // Tests run beside each other.
+    static FILES: AtomicUsize = AtomicUsize::new(0);
+    let file = format!("{}-{}", std::process::id(), FILES.fetch_add(1, Ordering::Relaxed));
+    let [source, made] = ["comp", "spv"]
+        .map(|end| Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}-{file}.{end}")));
     std::fs::write(&source, text).unwrap();
     let output =
         Command::new("glslangValidator").arg("-V").arg(&source).arg("-o").arg(&made).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
     let words: Vec<u32> = bytemuck::pod_collect_to_vec(&std::fs::read(&made).unwrap());
     [source, made].iter().for_each(|path| std::fs::remove_file(path).unwrap());
+    let entry = wgpu::PassthroughShaderEntryPoint { name: "main".into(), workgroup_size: (8, 1, 1) };
     let descriptor = wgpu::ShaderModuleDescriptorPassthrough {
         label: Some(name),
+        entry_points: vec![entry].into(),
         spirv: Some(words.into()),
         ..Default::default()
     };

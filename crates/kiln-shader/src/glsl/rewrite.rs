@@ -177,6 +177,7 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
                     format!("write `{single}`: there are no doubles in WGSL"),
                 );
             }
+            (".", _) if self.column_component(tokens, at) => return,
             ("==" | "!=", _) if self.comparison(tokens, at) => return,
             (text, _) if lazy::is_assignment(text) && self.column_assignment(tokens, at) => return,
             (_, Kind::Word) => return self.word(tokens, at),

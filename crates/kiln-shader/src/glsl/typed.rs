@@ -125,6 +125,31 @@ impl Rewriter<'_, '_, '_> {
         true
     }
 
+    /// Writes `m[i].y = v`, `m[i].y++` and their like as `m[i][1]`; the dot stands at `at`.
+    pub(super) fn column_component(&mut self, tokens: &[Token], at: usize) -> bool {
+        let is_step = |token: &Token| token.is("++") || token.is("--");
+        let [_, component, next, ..] = &tokens[at..] else { return false };
+        let sets = ["xyzw", "rgba", "stpq"];
+        let index =
+            sets.iter().find_map(|set| set.find(&*component.text)).filter(|_| component.text.len() == 1);
+        let (Some(index), Some(close)) = (index, at.checked_sub(1).filter(|close| tokens[*close].is("]")))
+        else {
+            return false;
+        };
+        let start = statement::place_start(tokens, at);
+        let is_stepped = start.checked_sub(1).is_some_and(|before| is_step(&tokens[before]));
+        if !(is_stepped || is_step(next) || lazy::is_assignment(&next.text)) {
+            return false;
+        }
+        let open = lex::opening(tokens, close).filter(|open| *open > start);
+        if open.and_then(|open| self.type_of(&tokens[start..open])?.rows()).is_none() {
+            return false;
+        }
+        self.out.extend(tokens_of(&["[", &index.to_string(), "]"], component.place));
+        self.instead.insert(at + 1, Vec::new());
+        true
+    }
+
     /// The function to call for a `mat2` of one argument that may be a `vec4`, which naga does not take.
     pub(super) fn matrix_of_vector(&mut self, tokens: &[Token], at: usize) -> Option<Token> {
         if !is_matrix_of_one(tokens, at) {

@@ -13,6 +13,7 @@ void main() {
     frame.basis[at].wzyx = frame.basis[0];
     frame.flat_[1][at].xy += vec2(at > 1 ? 1.0 : 2.0, 3.0);
     stored[1].zy = vec2(1.0);
+    m[at].y += 1.0; m[1].g++; --m[2].z; stored[0].x = m[0].y;
     turn(m);
     vec2 both = (m[0].xy = vec2(7.0));
     data[0] = m[1].x + both.y;
