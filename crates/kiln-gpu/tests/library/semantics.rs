@@ -176,7 +176,8 @@ fn differences(ours: &[u32], theirs: &[u32]) -> Vec<String> {
     let differs = |at: usize| {
         let [a, b] = [ours[at], theirs[at]];
         let [x, y] = [a, b].map(f32::from_bits);
-        a != b && (at < COUNT || !((x - y).abs() <= RELATIVE_MAX * x.abs().max(y.abs())))
+        let is_close = (x - y).abs() <= RELATIVE_MAX * x.abs().max(y.abs());
+        a != b && (at < COUNT || !is_close)
     };
     let describe = |at: usize| match at.checked_sub(COUNT) {
         None => format!("ints[{at}]: {} here, {} there", ours[at] as i32, theirs[at] as i32),
