@@ -34,8 +34,11 @@ mod effects;
 mod explain;
 mod extension;
 mod include;
+mod index;
+mod initial;
 mod inout;
 mod join;
+mod layout;
 mod lazy;
 mod lex;
 mod locations;
@@ -46,11 +49,17 @@ mod order;
 mod padding;
 mod preprocess;
 mod rewrite;
+mod scene;
 mod source;
 mod stage;
 mod stage_module;
 mod statement;
+mod stride;
 mod switch;
+mod texture;
+mod texture_array;
+mod typed;
+mod types;
 
 /// A stage after preprocessing.
 #[derive(Debug)]
@@ -61,6 +70,8 @@ struct Parsed {
     tokens: Vec<Token>,
     items: Vec<Item>,
     counts: BTreeMap<Rc<str>, usize>,
+    /// How many textures each array of them has; the items hold its elements.
+    texture_arrays: BTreeMap<Rc<str>, usize>,
 }
 
 impl Parsed {
@@ -70,7 +81,7 @@ impl Parsed {
             *counts.entry(Rc::clone(&token.text)).or_insert(0) += 1;
         }
         let items = declare::parse(&tokens);
-        Parsed { stage, root, tokens, items, counts }
+        Parsed { stage, root, tokens, items, counts, texture_arrays: BTreeMap::new() }
     }
 
     /// How often a word stands in the stage.
@@ -87,7 +98,10 @@ pub fn compile(program: &Program, features: &BTreeSet<String>, lints: bool, read
     let stages = load(&mut sources, program, features, &mut named);
     let mut compiled = if has_errors(&sources) { None } else { translate(&mut sources, &stages, lints) };
     if let Some(compiled) = &mut compiled {
-        let annotations = annotations(&mut sources);
+        let mut annotations = annotations(&mut sources);
+        for (variable, value) in initial::values(&stages) {
+            parameter::give_first(&mut annotations, &variable.name.text, variable.ty.is("bool"), value);
+        }
         compiled.reflection.parameters = parameter::parameters(&compiled.reflection, annotations);
     }
     let Sources { dependencies, diagnostics: found, .. } = sources;
@@ -163,7 +177,8 @@ fn load(
         }
         let tokens = preprocessed.tokens;
         if nesting::check_characters(sources, &tokens) && nesting::check_nesting(sources, &tokens) {
-            let parsed = Parsed::new(stage, root, tokens);
+            let mut parsed = Parsed::new(stage, root, tokens);
+            texture_array::expand(sources, &mut parsed);
             if nesting::check_count(sources, &parsed) {
                 stages.push(parsed);
             }
@@ -207,7 +222,7 @@ fn translate(sources: &mut Sources<'_, '_>, stages: &[Parsed], lints: bool) -> O
     let interfaces = locations::assign(sources, stages);
     let bound = bindings::assign(sources, stages);
     let holders = lower::holder_names(stages);
-    let texts: Vec<source::Mapped> = stages
+    let texts: Vec<lower::Lowered> = stages
         .iter()
         .zip(&interfaces)
         .map(|(stage, interface)| lower::lower(sources, stage, interface, &bound, &holders))
@@ -221,8 +236,9 @@ fn translate(sources: &mut Sources<'_, '_>, stages: &[Parsed], lints: bool) -> O
     let files = sources.files.iter().map(|file| (file.path.as_str(), &*file.text));
     let allowances = if lints { Allowances::read(files, &mut diagnostics) } else { Allowances::default() };
     sources.diagnostics.append(&mut diagnostics);
-    for (stage, text) in stages.iter().zip(&texts) {
-        let found: Vec<Diagnostic> = match stage_module::translate(&text.text, stage.stage, &names, lints) {
+    for (stage, lowered) in stages.iter().zip(&texts) {
+        let text = &lowered.text;
+        let found: Vec<Diagnostic> = match stage_module::translate(lowered, stage.stage, &names, lints) {
             Ok(Ok((wgsl, warnings))) => {
                 written.push((wgsl, stage::ending(stage.stage)));
                 let warn = |Warning { rule, finding, help }| {

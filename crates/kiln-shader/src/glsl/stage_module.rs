@@ -5,9 +5,10 @@ use std::ops::Range;
 
 use naga::front::glsl::{Error, ErrorKind, ExpectedToken, Frontend, Options, TokenValue};
 use naga::valid::{FunctionError, ValidationError};
-use naga::{AddressSpace, Barrier, Block, Expression, Module, Statement, TypeInner};
+use naga::{AddressSpace, Arena, Barrier, Block, Expression, Module, Statement, TypeInner};
 
-use super::{inout, lower, stage};
+use super::lower::Lowered;
+use super::{inout, layout, lower, stage, stride};
 use crate::explain::Finding;
 use crate::front::{self, Fault};
 use crate::lint::{self, Warning};
@@ -20,8 +21,8 @@ pub type Made = Result<(String, Vec<Warning>), Vec<Finding>>;
 pub type Names = BTreeMap<(u32, u32), String>;
 
 /// Translates a stage; with `lints`, also says what is doubtful.
-pub fn translate(text: &str, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fault> {
-    match front::on_deep_stack(Fault::Internal, || run(text, stage, names, lints)) {
+pub fn translate(lowered: &Lowered, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fault> {
+    match front::on_deep_stack(Fault::Internal, || run(lowered, stage, names, lints)) {
         // naga's GLSL front end panics where its WGSL front end says where the type is.
         Err(Fault::Internal(panic)) if panic.contains("LayoutError") && panic.contains("TooLarge") => {
             let message = "an array or struct has 2 GiB or more".to_owned();
@@ -31,15 +32,24 @@ pub fn translate(text: &str, stage: Stage, names: &Names, lints: bool) -> Result
     }
 }
 
-fn run(text: &str, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fault> {
+fn run(lowered: &Lowered, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fault> {
+    let text = &*lowered.text.text;
     let options = Options::from(stage::for_naga(stage));
     let mut module = match Frontend::default().parse(&options, text) {
         Ok(module) => module,
         Err(errors) => return Ok(Err(errors.errors.iter().map(|error| finding(text, error)).collect())),
     };
+    stride::close_gaps(&mut module);
+    let misplaced = layout::apply(&mut module, text, &lowered.moved);
+    if !misplaced.is_empty() {
+        return Ok(Err(misplaced));
+    }
     name_variables(&mut module, stage, names);
     name_members(&mut module);
-    module.functions.iter_mut().for_each(|(_, function)| repair(&mut function.body));
+    for (_, function) in module.functions.iter_mut() {
+        repair(&mut function.body);
+        measure_in_place(&mut function.expressions);
+    }
     inout::copy_parts(&mut module);
     if let Err(error) = front::validate(&module) {
         let mut finding = front::validation_finding(&module, &error);
@@ -112,6 +122,19 @@ fn name_members(module: &mut Module) {
         }
         if renamed {
             module.types.replace(handle, ty);
+        }
+    }
+}
+
+/// naga loads an array to ask for its length, which none without a length allows: the question goes to its place.
+fn measure_in_place(expressions: &mut Arena<Expression>) {
+    let measured = expressions.iter().filter_map(|(_, expression)| match expression {
+        Expression::ArrayLength(array) => Some(*array),
+        _ => None,
+    });
+    for array in measured.collect::<Vec<_>>() {
+        if let Expression::Load { pointer } = expressions[array] {
+            expressions[array] = expressions[pointer].clone();
         }
     }
 }
