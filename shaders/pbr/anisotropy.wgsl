@@ -1,14 +1,23 @@
 // Brushed surfaces under the environment. KHR_materials_anisotropy.
 
 import lib::anisotropy::anisotropic_normal;
+import lib::material::texture_coordinate;
 import lib::vector::normalize_or;
-import super::interface::{material, Varying};
+import super::interface::{base_color_sampler, material, Varying};
+
+@group(1) @binding(27) var anisotropy_texture: texture_2d<f32>;
 
 // The normal that mirror directions are taken at; `normal` itself where the mesh has no tangents.
 fn brushed_normal(in: Varying, normal: vec3f, view: vec3f, perceptual_roughness: f32) -> vec3f {
+    let uv = texture_coordinate(material.anisotropy_uv_u, material.anisotropy_uv_v, in.uv0, in.uv1);
+    // Red and green hold the brush's direction in the tangent frame, blue how strong it is.
+    let texel = textureSample(anisotropy_texture, base_color_sampler, uv);
+    let direction = texel.rg * 2.0 - 1.0;
+    let turn = vec2f(cos(material.anisotropy_rotation), sin(material.anisotropy_rotation));
+    let along = vec2f(turn.x * direction.x - turn.y * direction.y, turn.y * direction.x + turn.x * direction.y);
     let t = in.tangent.xyz;
     let b = in.tangent.w * cross(in.normal, t);
-    let brush = cos(material.anisotropy_rotation) * t + sin(material.anisotropy_rotation) * b;
-    let across = normalize_or(cross(normal, brush), vec3f(0.0));
-    return anisotropic_normal(normal, across, view, saturate(material.anisotropy_strength), perceptual_roughness);
+    let across = normalize_or(cross(normal, along.x * t + along.y * b), vec3f(0.0));
+    let strength = saturate(material.anisotropy_strength * texel.b);
+    return anisotropic_normal(normal, across, view, strength, perceptual_roughness);
 }

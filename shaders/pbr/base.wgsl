@@ -4,11 +4,10 @@ import lib::brdf::alpha2_filtered;
 import lib::environment::{dominant_direction, ggx_albedo, ggx_scale_bias, irradiance_over_pi, specular_radiance};
 @if(occlusion) import lib::material::specular_occlusion;
 import lib::vector::max_component;
-@if(diffuse_transmission) import super::diffuse_transmission::with_light_from_behind;
+@if(diffuse_transmission) import super::diffuse_transmission::{light_from_behind, Scattering};
 @if(transmission && dispersion) import super::dispersion::dispersed_radiance;
-@if(iridescence) import super::iridescence::iridescent_f0;
+@if(iridescence) import super::iridescence::{Film, iridescent_f0};
 @if(transmission && !dispersion) import super::transmission::refracted_radiance;
-@if(transmission && volume) import super::volume::medium_transmittance;
 
 // Directions have unit length and point away from the surface.
 struct Base {
@@ -23,7 +22,11 @@ struct Base {
     occlusion: f32,
     @if(transmission) transmission: f32,
     @if(transmission) ior: f32,
+    // What is left of light that passes the medium.
+    @if((diffuse_transmission || transmission) && volume) transmittance: vec3f,
     @if(diffuse_transmission) metallic: f32,
+    @if(diffuse_transmission) scattering: Scattering,
+    @if(iridescence) film: Film,
 }
 
 // Perceptual roughness that also covers how the normal turns within the pixel.
@@ -35,7 +38,7 @@ fn filtered_roughness(perceptual_roughness: f32, geometric_normal: vec3f) -> f32
 fn base_radiance(base: Base) -> vec3f {
     let roughness = base.perceptual_roughness;
     let n_dot_v = saturate(dot(base.normal, base.view));
-    @if(iridescence) let f0 = iridescent_f0(base.f0, base.f90, n_dot_v);
+    @if(iridescence) let f0 = iridescent_f0(base.film, base.f0, base.f90, n_dot_v);
     @else let f0 = base.f0;
     let albedo = ggx_albedo(f0, base.f90, ggx_scale_bias(n_dot_v, roughness));
     @if(anisotropy) let r = reflect(-base.view, base.mirror_normal);
@@ -49,11 +52,15 @@ fn base_radiance(base: Base) -> vec3f {
     let left = 1.0 - max_component(albedo.single + albedo.multiple);
     let below = base.diffuse_color * left;
     var diffuse = below * irradiance;
-    @if(diffuse_transmission) diffuse = with_light_from_behind(diffuse, base.normal, left * (1.0 - base.metallic));
+    @if(diffuse_transmission) {
+        var behind = light_from_behind(base.scattering, base.normal, left * (1.0 - base.metallic));
+        @if(volume) behind *= base.transmittance;
+        diffuse = mix(diffuse, behind, base.scattering.share);
+    }
     @if(transmission) {
         @if(dispersion) let behind = dispersed_radiance(base.view, base.normal, roughness, base.ior);
         @else let behind = refracted_radiance(base.view, base.normal, roughness, base.ior);
-        @if(volume) let through = behind * medium_transmittance();
+        @if(volume) let through = behind * base.transmittance;
         @else let through = behind;
         diffuse = mix(diffuse, below * through, base.transmission);
     }

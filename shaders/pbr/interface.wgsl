@@ -44,15 +44,28 @@ struct Material {
     @if(transmission && !unlit) transmission_uv_u: vec4f,
     @if(transmission && !unlit) transmission_uv_v: vec4f,
     @if(transmission && !unlit) transmission_factor: f32,
-    @if(transmission && volume && !unlit) attenuation_color: vec3f,
-    @if(transmission && volume && !unlit) attenuation_distance: f32,
-    @if(transmission && volume && !unlit) thickness_factor: f32,
+    @if((diffuse_transmission || transmission) && volume && !unlit) thickness_uv_u: vec4f,
+    @if((diffuse_transmission || transmission) && volume && !unlit) thickness_uv_v: vec4f,
+    @if((diffuse_transmission || transmission) && volume && !unlit) attenuation_color: vec3f,
+    @if((diffuse_transmission || transmission) && volume && !unlit) attenuation_distance: f32,
+    @if((diffuse_transmission || transmission) && volume && !unlit) thickness_factor: f32,
     @if(transmission && dispersion && !unlit) dispersion: f32,
+    @if(diffuse_transmission && !unlit) diffuse_transmission_uv_u: vec4f,
+    @if(diffuse_transmission && !unlit) diffuse_transmission_uv_v: vec4f,
+    @if(diffuse_transmission && !unlit) diffuse_transmission_color_uv_u: vec4f,
+    @if(diffuse_transmission && !unlit) diffuse_transmission_color_uv_v: vec4f,
     @if(diffuse_transmission && !unlit) diffuse_transmission_color_factor: vec3f,
     @if(diffuse_transmission && !unlit) diffuse_transmission_factor: f32,
+    @if(iridescence && !unlit) iridescence_uv_u: vec4f,
+    @if(iridescence && !unlit) iridescence_uv_v: vec4f,
+    @if(iridescence && !unlit) iridescence_thickness_uv_u: vec4f,
+    @if(iridescence && !unlit) iridescence_thickness_uv_v: vec4f,
     @if(iridescence && !unlit) iridescence_factor: f32,
     @if(iridescence && !unlit) iridescence_ior: f32,
+    @if(iridescence && !unlit) iridescence_thickness_minimum: f32,
     @if(iridescence && !unlit) iridescence_thickness_maximum: f32,
+    @if(anisotropy && !unlit) anisotropy_uv_u: vec4f,
+    @if(anisotropy && !unlit) anisotropy_uv_v: vec4f,
     @if(anisotropy && !unlit) anisotropy_strength: f32,
     @if(anisotropy && !unlit) anisotropy_rotation: f32,
 }
@@ -64,6 +77,10 @@ struct Draw {
 
 @group(1) @binding(0) var<uniform> material: Material;
 @group(2) @binding(0) var<uniform> draw: Draw;
+
+// Base colour is read through it, and so are the maps of anisotropy, iridescence, volume and diffuse transmission: backends have places
+// for 16 samplers, and materials that wrap these otherwise than their base colour are rare.
+@group(1) @binding(2) var base_color_sampler: sampler;
 
 struct Vertex {
     @location(0) position: vec3f,

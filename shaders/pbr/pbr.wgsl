@@ -10,13 +10,15 @@ import lib::vector::normalize_or;
 @if(anisotropy && !unlit) import super::anisotropy::brushed_normal;
 @if(!unlit) import super::base::{Base, base_radiance, filtered_roughness};
 @if(clearcoat && !unlit) import super::clearcoat::{coat, under_coat};
-import super::interface::{draw, material, Varying, Vertex};
+@if(diffuse_transmission && !unlit) import super::diffuse_transmission::scattering;
+import super::interface::{base_color_sampler, draw, material, Varying, Vertex};
+@if(iridescence && !unlit) import super::iridescence::film;
 @if(sheen && !unlit) import super::sheen::{sheen, under_sheen};
 @if(specular && !unlit) import super::specular::dielectric_reflectance;
 @if(transmission && !unlit) import super::transmission::transmission;
+@if((diffuse_transmission || transmission) && volume && !unlit) import super::volume::medium_transmittance;
 
 @group(1) @binding(1) var base_color_texture: texture_2d<f32>;
-@group(1) @binding(2) var base_color_sampler: sampler;
 @if(!unlit) @group(1) @binding(3) var metallic_roughness_texture: texture_2d<f32>;
 @if(!unlit) @group(1) @binding(4) var metallic_roughness_sampler: sampler;
 @if(normal_map && !unlit) @group(1) @binding(5) var normal_texture: texture_2d<f32>;
@@ -103,7 +105,10 @@ fn base_layer(in: Varying, color: vec3f, geometric_normal: vec3f, facing: f32, v
     @if(occlusion && !unlit) base.occlusion = ambient_occlusion(in);
     @if(transmission && !unlit) base.transmission = transmission(in);
     @if(transmission && !unlit) base.ior = material.ior;
+    @if((diffuse_transmission || transmission) && volume) base.transmittance = medium_transmittance(in, base.normal);
     @if(diffuse_transmission) base.metallic = metallic;
+    @if(diffuse_transmission) base.scattering = scattering(in);
+    @if(iridescence) base.film = film(in);
     return base;
 }
 

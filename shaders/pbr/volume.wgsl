@@ -1,10 +1,24 @@
 // What a medium swallows of the light that passes it. KHR_materials_volume.
 
+import lib::material::texture_coordinate;
+import lib::vector::normalize_or;
 import lib::volume::volume_attenuation;
-import super::interface::{draw, material};
+import super::interface::{base_color_sampler, draw, material, Varying};
 
-// Along the thickness, which is given in the object's units. Of a scale that differs between axes the first counts.
-fn medium_transmittance() -> vec3f {
-    let distance = material.thickness_factor * length(draw.world_from_object[0].xyz);
+@group(1) @binding(30) var thickness_texture: texture_2d<f32>;
+
+// Share of light left after the thickness below a point.
+fn medium_transmittance(in: Varying, normal: vec3f) -> vec3f {
+    let uv = texture_coordinate(material.thickness_uv_u, material.thickness_uv_v, in.uv0, in.uv1);
+    let thickness = material.thickness_factor * textureSample(thickness_texture, base_color_sampler, uv).g;
+    let distance = thickness * object_scale_along(normal);
     return volume_attenuation(distance, material.attenuation_color, material.attenuation_distance);
+}
+
+// World units to one of the object's, along a world normal: thickness is given in the object's units, distances in the world's.
+fn object_scale_along(normal: vec3f) -> f32 {
+    let m = draw.world_from_object;
+    let linear = mat3x3f(m[0].xyz, m[1].xyz, m[2].xyz);
+    // A normal goes back to the object by the transpose.
+    return length(linear * normalize_or(transpose(linear) * normal, vec3f(0.0)));
 }

@@ -15,6 +15,8 @@ mod faults;
 mod golden;
 mod harness;
 mod live;
+#[cfg(feature = "preview")]
+mod parameters;
 mod shaders;
 mod tidy;
 #[cfg(feature = "preview")]

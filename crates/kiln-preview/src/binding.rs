@@ -1,9 +1,13 @@
 //! Bind groups, filled by name.
 
+use std::sync::Arc;
+
 use kiln_gpu::Gpu;
 use kiln_scene::Material;
 use wgpu::util::{BufferInitDescriptor, DeviceExt as _};
 
+use crate::own::OwnGroup;
+use crate::parameter::ParameterValues;
 use crate::prepare::Environment;
 use crate::program::{Bound, Program};
 use crate::scene_gpu::GpuScene;
@@ -14,7 +18,7 @@ use crate::uniform::{FrameValues, fill_block, material_member};
 #[derive(Debug)]
 pub(crate) struct FrameBinding {
     group: Option<wgpu::BindGroup>,
-    own: Option<wgpu::BindGroup>,
+    own: Option<Arc<OwnGroup>>,
     block: Option<(wgpu::Buffer, Bound)>,
 }
 
@@ -49,7 +53,8 @@ impl FrameBinding {
 
     /// Sets groups 0 and 3.
     pub fn set(&self, pass: &mut wgpu::RenderPass<'_>) {
-        for (index, group) in [(0, &self.group), (3, &self.own)] {
+        let own = self.own.as_ref().map(|own| &own.group);
+        for (index, group) in [(0, self.group.as_ref()), (3, own)] {
             if let Some(group) = group {
                 pass.set_bind_group(index, group, &[]);
             }
@@ -61,8 +66,11 @@ impl FrameBinding {
         self.block.as_ref().is_some_and(|(_, bound)| bound.reads_time())
     }
 
-    /// Writes this frame's values.
-    pub fn write(&self, gpu: &Gpu, values: &FrameValues) {
+    /// Writes this frame's values and those of the author's parameters.
+    pub fn write(&self, gpu: &Gpu, values: &FrameValues, parameters: &ParameterValues) {
+        if let Some(own) = &self.own {
+            own.write(gpu, parameters);
+        }
         if let Some((buffer, Bound { block: Some((size_bytes, members)), .. })) = &self.block {
             gpu.queue.write_buffer(buffer, 0, &fill_block(*size_bytes, members, |name| values.member(name)));
         }

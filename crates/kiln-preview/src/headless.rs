@@ -6,6 +6,7 @@ use image::RgbaImage;
 use kiln_gpu::{Gpu, GpuError};
 use kiln_link::Revision;
 
+use crate::assignment::{Assignment, RefusedParameter};
 use crate::prepare::Preparer;
 use crate::renderer::Renderer;
 use crate::report::ApplyReport;
@@ -50,7 +51,7 @@ impl HeadlessViewer {
     /// Shows a revision; returns when pipelines and uploads are done. What cannot be used keeps its last good form.
     pub fn apply(&mut self, revision: &Revision) -> ApplyReport {
         self.revision = Some(revision.clone());
-        if let Some(prepared) = self.preparer.prepare(revision, &self.selection) {
+        if let Some(prepared) = self.preparer.prepare(revision, &self.selection, &self.view.parameters) {
             self.report = prepared.report.clone();
             self.renderer.show(Arc::new(prepared));
         }
@@ -58,6 +59,24 @@ impl HeadlessViewer {
         // A device that is lost shows when the picture is read.
         drop(self.gpu.wait());
         self.report.clone()
+    }
+
+    /// Sets parameters of shaders that are shown; if one is refused, none is set.
+    ///
+    /// # Errors
+    /// There is no such parameter, or it does not take the value.
+    pub fn assign(&mut self, assignments: &[Assignment]) -> Result<ApplyReport, RefusedParameter> {
+        let mut values = self.view.parameters.clone();
+        for assignment in assignments {
+            values.assign(assignment, &self.report.parameters)?;
+        }
+        // Members of `params` are written with every frame; overrides stand in pipelines.
+        let has_other_pipelines = values.overrides() != self.view.parameters.overrides();
+        self.view.parameters = values;
+        match self.revision.take_if(|_| has_other_pipelines) {
+            Some(revision) => Ok(self.apply(&revision)),
+            None => Ok(self.report.clone()),
+        }
     }
 
     /// Changes the picture's size.

@@ -90,7 +90,7 @@ impl<T> Keeper<T> {
 }
 
 /// Runs `make`; errors of wgpu and panics of its shader compiler become diagnostics too.
-fn make_checked<T>(
+pub(crate) fn make_checked<T>(
     gpu: &Gpu,
     name: &str,
     make: impl FnOnce() -> Result<T, Diagnostic>,

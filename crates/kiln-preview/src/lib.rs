@@ -16,13 +16,16 @@
     reason = "a diagnostic is made at most once for a target, never in a loop"
 )]
 
+pub use assignment::{Assignment, RefusedParameter};
 pub use camera::OrbitCamera;
 pub use headless::HeadlessViewer;
+pub use parameter::{OfferedParameter, ParameterValues};
 pub use report::ApplyReport;
 pub use run::{HeadlessOptions, HeadlessReport, run_headless};
 pub use view::{Selection, View};
 pub use window::{WindowOptions, run_window};
 
+mod assignment;
 mod binding;
 mod camera;
 mod connection;
@@ -35,6 +38,7 @@ mod mip;
 mod neutral;
 mod own;
 mod panel;
+mod parameter;
 mod prepare;
 mod program;
 mod renderer;

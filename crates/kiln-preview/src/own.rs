@@ -6,10 +6,10 @@ use kiln_diagnostic::Diagnostic;
 use kiln_gpu::Gpu;
 use kiln_link::Revision;
 use kiln_scene::{Sampler, Wrap, decode_image};
-use kiln_shader::Reflection;
-use wgpu::util::DeviceExt as _;
+use kiln_shader::Member;
 
 use crate::mip::Average;
+use crate::parameter::{OfferedParameter, ParameterValues};
 use crate::program::Bound;
 use crate::slot::Slot;
 use crate::texture::{create_sampler, upload_image};
@@ -21,6 +21,30 @@ pub(crate) struct OwnTextures {
     views: BTreeMap<String, wgpu::TextureView>,
     /// Repeats, trilinear.
     sampler: wgpu::Sampler,
+}
+
+/// A shader's group 3.
+#[derive(Debug)]
+pub(crate) struct OwnGroup {
+    pub group: wgpu::BindGroup,
+    block: Option<ParameterBlock>,
+}
+
+/// The uniform `params` with the parameters of its members.
+#[derive(Debug)]
+struct ParameterBlock {
+    buffer: wgpu::Buffer,
+    size_bytes: u32,
+    fields: Vec<(Member, OfferedParameter)>,
+}
+
+impl OwnGroup {
+    /// Writes the parameters' values.
+    pub fn write(&self, gpu: &Gpu, values: &ParameterValues) {
+        if let Some(ParameterBlock { buffer, size_bytes, fields }) = &self.block {
+            gpu.queue.write_buffer(buffer, 0, &parameter_block(*size_bytes, fields, values));
+        }
+    }
 }
 
 /// Prefix of the parts of a shader's target that are textures.
@@ -63,38 +87,49 @@ impl OwnTextures {
         })
     }
 
-    /// The bind group of a shader's own textures, and of its parameters with their first values.
+    /// Group 3 of a shader that offers `parameters`.
     pub fn group(
         &self,
         gpu: &Gpu,
         layout: Option<&wgpu::BindGroupLayout>,
         bounds: &[Bound],
-        reflection: &Reflection,
-    ) -> Option<wgpu::BindGroup> {
+        parameters: &[OfferedParameter],
+    ) -> Option<OwnGroup> {
         let layout = layout?;
-        let buffers: Vec<Option<wgpu::Buffer>> =
-            bounds.iter().map(|bound| parameter_buffer(gpu, bound, reflection)).collect();
+        let block = bounds.iter().find_map(|bound| ParameterBlock::new(gpu, bound, parameters));
         let resource = |bound: &Bound| match bound.slot {
             Slot::OwnTexture => self.views.get(&bound.name).map(wgpu::BindingResource::TextureView),
             Slot::OwnSampler => Some(wgpu::BindingResource::Sampler(&self.sampler)),
+            Slot::Params => block.as_ref().map(|block| block.buffer.as_entire_binding()),
             _ => None,
         };
-        let mut entries = Vec::new();
-        for (bound, buffer) in bounds.iter().zip(&buffers) {
-            let resource =
-                buffer.as_ref().map(wgpu::Buffer::as_entire_binding).or_else(|| resource(bound))?;
-            entries.push(wgpu::BindGroupEntry { binding: bound.binding, resource });
-        }
+        let entry =
+            |bound: &Bound| Some(wgpu::BindGroupEntry { binding: bound.binding, resource: resource(bound)? });
+        let entries = bounds.iter().map(entry).collect::<Option<Vec<_>>>()?;
         let descriptor = wgpu::BindGroupDescriptor { label: Some("own"), layout, entries: &entries };
-        Some(gpu.device.create_bind_group(&descriptor))
+        Some(OwnGroup { group: gpu.device.create_bind_group(&descriptor), block })
     }
 }
 
-fn parameter_buffer(gpu: &Gpu, bound: &Bound, reflection: &Reflection) -> Option<wgpu::Buffer> {
-    let (size_bytes, members) = bound.block.as_ref()?;
-    Some(gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some("params"),
-        contents: &parameter_block(*size_bytes, members, &reflection.parameters),
-        usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-    }))
+impl ParameterBlock {
+    /// `None` for what is no uniform.
+    fn new(gpu: &Gpu, bound: &Bound, parameters: &[OfferedParameter]) -> Option<Self> {
+        let (size_bytes, members) = bound.block.as_ref()?;
+        let field = |member: &Member| {
+            let is_its =
+                |parameter: &&OfferedParameter| parameter.name == member.name && !parameter.is_override;
+            Some((member.clone(), parameters.iter().find(is_its)?.clone()))
+        };
+        let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("params"),
+            size: u64::from(*size_bytes),
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        Some(ParameterBlock {
+            buffer,
+            size_bytes: *size_bytes,
+            fields: members.iter().filter_map(field).collect(),
+        })
+    }
 }

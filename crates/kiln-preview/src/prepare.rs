@@ -14,6 +14,7 @@ use crate::draw_list::DrawList;
 use crate::keeper::{Keeper, Key};
 use crate::neutral;
 use crate::own::OwnTextures;
+use crate::parameter::{OfferedParameter, ParameterValues};
 use crate::program::{Program, Raster};
 use crate::report::{ApplyReport, choose, describe};
 use crate::scene_gpu::GpuScene;
@@ -40,6 +41,7 @@ pub(crate) struct Prepared {
     pub draws: DrawList,
     pub background: Option<(wgpu::RenderPipeline, FrameBinding)>,
     pub tonemap: Arc<Program>,
+    pub tonemap_pipeline: wgpu::RenderPipeline,
     /// Whether a shader in use reads the time.
     pub is_animated: bool,
 }
@@ -52,6 +54,8 @@ pub(crate) struct Preparer {
     luts: Keeper<LutTexture>,
     scenes: Keeper<GpuScene>,
     programs: Keeper<Program>,
+    /// What pipelines are made with.
+    parameters: ParameterValues,
     neutral_cube: Arc<CubeTexture>,
     neutral_lut: Arc<LutTexture>,
     neutral_tonemap: Option<Arc<Program>>,
@@ -72,6 +76,7 @@ impl Preparer {
             luts: Keeper::default(),
             scenes: Keeper::default(),
             programs: Keeper::default(),
+            parameters: ParameterValues::default(),
             neutral_cube: Arc::new(CubeTexture::neutral(gpu)),
             neutral_lut: Arc::new(LutTexture::neutral(gpu)),
             neutral_tonemap: tonemap.ok().map(Arc::new),
@@ -79,9 +84,15 @@ impl Preparer {
         }
     }
 
-    /// Makes everything that drawing the selection needs, or takes it over from earlier. `None` only if the device
-    /// does not even accept the built-in tonemap.
-    pub fn prepare(&mut self, revision: &Revision, selection: &Selection) -> Option<Prepared> {
+    /// Makes everything that drawing the selection needs, or takes it over from earlier, with these values of overrides. `None`
+    /// only if the device does not even accept the built-in tonemap.
+    pub fn prepare(
+        &mut self,
+        revision: &Revision,
+        selection: &Selection,
+        parameters: &ParameterValues,
+    ) -> Option<Prepared> {
+        self.parameters = parameters.overrides();
         let mut report = describe(revision);
         let scene_name = choose(selection.scene.as_deref(), None, &report.scenes, "scene", &mut report.notes);
         let meta = scene_name.as_ref().and_then(|name| scene_meta(revision, name, &mut report));
@@ -91,6 +102,7 @@ impl Preparer {
         let environment = self.environment(revision, env.as_deref(), &mut report);
         let tonemap = self.full_screen_program(revision, Role::Tonemap, &mut report);
         let tonemap = tonemap.or_else(|| self.neutral_tonemap.clone())?;
+        let tonemap_pipeline = tonemap.pipeline(&self.gpu.device, Raster::FULL_SCREEN);
         let background = self.full_screen_program(revision, Role::Background, &mut report).map(|program| {
             let pipeline = program.pipeline(&self.gpu.device, Raster::FULL_SCREEN);
             (pipeline, FrameBinding::new(&self.gpu, &program, &environment, None))
@@ -109,7 +121,16 @@ impl Preparer {
             .map(|(_, frame)| frame)
             .chain(draws.programs.iter().map(|program| &program.frame));
         let is_animated = tonemap.reads_time() || frames.into_iter().any(FrameBinding::reads_time);
-        Some(Prepared { report, environment, scene, draws, background, tonemap, is_animated })
+        Some(Prepared {
+            report,
+            environment,
+            scene,
+            draws,
+            background,
+            tonemap,
+            tonemap_pipeline,
+            is_animated,
+        })
     }
 
     fn scene(&mut self, revision: &Revision, name: &str, report: &mut ApplyReport) -> Option<Arc<GpuScene>> {
@@ -219,7 +240,23 @@ impl Preparer {
             program.pipeline(&gpu.device, Raster::of_role(role));
             Ok(program)
         });
-        report.take(name, resolved)
+        let program = report.take(name, resolved);
+        self.adopt(program.as_deref(), report);
+        program
+    }
+
+    /// Gives a program that will be drawn with the overrides' values, and offers its parameters.
+    fn adopt(&self, program: Option<&Program>, report: &mut ApplyReport) {
+        let Some(program) = program else { return };
+        report.diagnostics.extend(program.specialise(&self.gpu, &self.parameters).err());
+        report.notes.extend(program.notes.iter().cloned());
+        for parameter in &program.parameters {
+            // Variants of a shader share their parameters.
+            let is_it = |other: &OfferedParameter| other.full_name() == parameter.full_name();
+            if !report.parameters.iter().any(is_it) {
+                report.parameters.push(parameter.clone());
+            }
+        }
     }
 
     fn draws(
@@ -260,6 +297,7 @@ impl Preparer {
             return Some(program);
         }
         if let Some(program) = self.programs.last_good(name) {
+            self.adopt(Some(&program), report);
             report.notes.push(absent(name, revision, true));
             return Some(program);
         }

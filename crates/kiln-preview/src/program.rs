@@ -1,14 +1,16 @@
 //! A compiled shader: its interface checked by name, its layouts, and its pipelines per raster state.
 
 use std::collections::HashMap;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use kiln_diagnostic::Diagnostic;
 use kiln_gpu::Gpu;
 use kiln_scene::Vertex;
-use kiln_shader::{Binding, BindingKind, Member, Reflection, Stage};
+use kiln_shader::{Binding, BindingKind, Member, Override, Reflection, Stage};
 
-use crate::own::OwnTextures;
+use crate::keeper::make_checked;
+use crate::own::{OwnGroup, OwnTextures};
+use crate::parameter::{OfferedParameter, ParameterValues, offered};
 use crate::slot::Slot;
 use crate::target::Role;
 use crate::uniform::{FrameValues, Value, draw_member, long_type_name, material_member};
@@ -71,6 +73,8 @@ impl Bound {
 /// A shader module ready to make pipelines.
 #[derive(Debug)]
 pub(crate) struct Program {
+    /// Of the target.
+    name: String,
     role: Role,
     module: wgpu::ShaderModule,
     attributes: Vec<wgpu::VertexAttribute>,
@@ -79,9 +83,21 @@ pub(crate) struct Program {
     /// Layouts by group; `None` where nothing is declared.
     pub layouts: [Option<wgpu::BindGroupLayout>; GROUP_COUNT],
     /// Group 3: the author's parameters and textures.
-    pub own_group: Option<wgpu::BindGroup>,
+    pub own_group: Option<Arc<OwnGroup>>,
+    /// What the author offers to be changed.
+    pub parameters: Vec<OfferedParameter>,
+    /// What of it cannot be.
+    pub notes: Vec<String>,
+    overrides: Vec<Override>,
     pipeline_layout: wgpu::PipelineLayout,
-    pipelines: Mutex<HashMap<Raster, wgpu::RenderPipeline>>,
+    pipelines: Mutex<Pipelines>,
+}
+
+/// Pipelines with one set of constants: a slider on its way leaves none behind.
+#[derive(Debug)]
+struct Pipelines {
+    constants: Vec<(String, f64)>,
+    by_raster: HashMap<Raster, wgpu::RenderPipeline>,
 }
 
 impl Program {
@@ -108,15 +124,54 @@ impl Program {
             label: Some(name),
             source: wgpu::ShaderSource::Wgsl(wgsl.into()),
         });
-        let pipelines = Mutex::default();
-        let own_group = own.group(gpu, layouts[3].as_ref(), &groups[3], reflection);
-        Ok(Program { own_group, role, module, attributes, groups, layouts, pipeline_layout, pipelines })
+        let (parameters, notes) = offered(shader_of(name), reflection);
+        let own_group = own.group(gpu, layouts[3].as_ref(), &groups[3], &parameters).map(Arc::new);
+        let overrides = reflection.overrides.clone();
+        let constants = constants(&parameters, &overrides, &ParameterValues::default());
+        Ok(Program {
+            name: name.to_owned(),
+            role,
+            module,
+            attributes,
+            groups,
+            layouts,
+            own_group,
+            parameters,
+            notes,
+            overrides,
+            pipeline_layout,
+            pipelines: Mutex::new(Pipelines { constants, by_raster: HashMap::new() }),
+        })
+    }
+
+    /// Makes pipelines with these values of the overrides from now on; with the ones before where the device refuses.
+    pub fn specialise(&self, gpu: &Gpu, values: &ParameterValues) -> Result<(), Diagnostic> {
+        let constants = constants(&self.parameters, &self.overrides, values);
+        if self.pipelines().constants == constants {
+            return Ok(());
+        }
+        let raster = Raster::of_role(self.role);
+        // Made without holding the lock: it may take long.
+        let made =
+            make_checked(gpu, &self.name, || Ok(self.create_pipeline(&gpu.device, raster, &constants)));
+        let pipeline = made.map_err(|fault| {
+            let set: Vec<String> =
+                constants.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+            fault.with_note(format!("its overrides were set: {}", set.join(", ")))
+        })?;
+        *self.pipelines() = Pipelines { constants, by_raster: [(raster, pipeline)].into() };
+        Ok(())
+    }
+
+    fn pipelines(&self) -> MutexGuard<'_, Pipelines> {
+        self.pipelines.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The pipeline for a raster state, created on first use.
     pub fn pipeline(&self, device: &wgpu::Device, raster: Raster) -> wgpu::RenderPipeline {
-        let mut pipelines = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
-        pipelines.entry(raster).or_insert_with(|| self.create_pipeline(device, raster)).clone()
+        let mut pipelines = self.pipelines();
+        let Pipelines { constants, by_raster } = &mut *pipelines;
+        by_raster.entry(raster).or_insert_with(|| self.create_pipeline(device, raster, constants)).clone()
     }
 
     /// Whether pictures change with time.
@@ -124,7 +179,15 @@ impl Program {
         self.groups[0].iter().any(Bound::reads_time)
     }
 
-    fn create_pipeline(&self, device: &wgpu::Device, raster: Raster) -> wgpu::RenderPipeline {
+    fn create_pipeline(
+        &self,
+        device: &wgpu::Device,
+        raster: Raster,
+        constants: &[(String, f64)],
+    ) -> wgpu::RenderPipeline {
+        let constants: Vec<(&str, f64)> =
+            constants.iter().map(|(name, value)| (name.as_str(), *value)).collect();
+        let options = wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() };
         let buffers = [Some(wgpu::VertexBufferLayout {
             array_stride: size_of::<Vertex>() as u64,
             step_mode: wgpu::VertexStepMode::Vertex,
@@ -137,7 +200,7 @@ impl Program {
             vertex: wgpu::VertexState {
                 module: &self.module,
                 entry_point: Some("vs_main"),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                compilation_options: options.clone(),
                 buffers: if self.role == Role::Material { &buffers } else { &[] },
             },
             primitive: wgpu::PrimitiveState {
@@ -153,7 +216,7 @@ impl Program {
             fragment: Some(wgpu::FragmentState {
                 module: &self.module,
                 entry_point: Some("fs_main"),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                compilation_options: options,
                 targets: &[Some(wgpu::ColorTargetState {
                     format: if is_tonemap { OUTPUT_FORMAT } else { HDR_FORMAT },
                     blend: raster.blend.then_some(wgpu::BlendState::ALPHA_BLENDING),
@@ -178,6 +241,26 @@ impl Program {
             bias: wgpu::DepthBiasState::default(),
         }
     }
+}
+
+/// `pbr` of `shader/pbr/base`.
+fn shader_of(target: &str) -> &str {
+    target.split('/').nth(1).unwrap_or(target)
+}
+
+/// Pipeline constants by what WGSL knows them by, their `@id` if they have one. Those that are as the shader has them are left out.
+fn constants(
+    parameters: &[OfferedParameter],
+    overrides: &[Override],
+    values: &ParameterValues,
+) -> Vec<(String, f64)> {
+    let constant = |parameter: &OfferedParameter| {
+        let declared = overrides.iter().find(|constant| constant.name == parameter.name)?;
+        let value = *values.of(parameter).first()?;
+        let key = declared.id.map_or_else(|| declared.name.clone(), |id| id.to_string());
+        (declared.default != Some(value)).then_some((key, value))
+    };
+    parameters.iter().filter(|parameter| parameter.is_override).filter_map(constant).collect()
 }
 
 fn check_entry_points(

@@ -10,7 +10,7 @@ use crate::binding::FrameBinding;
 use crate::camera::OrbitCamera;
 use crate::draw_list::{DrawItem, DrawList};
 use crate::prepare::Prepared;
-use crate::program::{DEPTH_FORMAT, HDR_FORMAT, OUTPUT_FORMAT, Raster, SAMPLE_COUNT};
+use crate::program::{DEPTH_FORMAT, HDR_FORMAT, OUTPUT_FORMAT, SAMPLE_COUNT};
 use crate::scene_gpu::GpuScene;
 use crate::uniform::FrameValues;
 use crate::view::View;
@@ -94,7 +94,7 @@ impl Renderer {
         let background = prepared.background.iter().map(|(_, frame)| frame);
         let programs = prepared.draws.programs.iter().map(|program| &program.frame);
         for frame in background.chain(programs).chain([tonemap]) {
-            frame.write(&self.gpu, &values);
+            frame.write(&self.gpu, &values, &view.parameters);
         }
         let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         self.draw_scene(&mut encoder, prepared, values.camera_position);
@@ -196,7 +196,7 @@ impl Renderer {
             })],
             ..Default::default()
         });
-        pass.set_pipeline(&prepared.tonemap.pipeline(&self.gpu.device, Raster::FULL_SCREEN));
+        pass.set_pipeline(&prepared.tonemap_pipeline);
         frame.set(&mut pass);
         pass.draw(0..3, 0..1);
     }

@@ -6,6 +6,7 @@ use kiln_diagnostic::Diagnostic;
 use kiln_link::{Revision, TargetState};
 
 use crate::keeper::Resolved;
+use crate::parameter::OfferedParameter;
 use crate::target::{ProjectMeta, read_meta};
 use crate::view::Selection;
 
@@ -22,6 +23,8 @@ pub struct ApplyReport {
     pub envs: Vec<String>,
     /// What is shown, whatever was asked for.
     pub shown: Selection,
+    /// What the authors of the shaders in use offer to be changed, by shader.
+    pub parameters: Vec<OfferedParameter>,
     /// What is approximate or replaced, a line each.
     pub notes: Vec<String>,
     /// What the preview could not use; the project's own diagnostics are in the revision's table.

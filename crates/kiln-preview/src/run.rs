@@ -9,6 +9,7 @@ use kiln_gpu::Gpu;
 use kiln_link::{Client, ClientEvent, FrameReport, Revision};
 use serde::Serialize;
 
+use crate::assignment::Assignment;
 use crate::headless::HeadlessViewer;
 use crate::report::ApplyReport;
 use crate::view::{Selection, View};
@@ -29,6 +30,8 @@ pub struct HeadlessOptions {
     pub selection: Selection,
     /// How to show it.
     pub view: View,
+    /// Parameters of shaders to set, in this order.
+    pub parameters: Vec<Assignment>,
     /// Turns the environment by this much from frame to frame.
     pub rotation_step_rad: f32,
     /// The first revision number that counts; older ones are passed over.
@@ -63,8 +66,8 @@ pub struct HeadlessReport {
 /// Renders frames of the first revision from `revision_min` on.
 ///
 /// # Errors
-/// No device, no revision in time, nothing that can be drawn, or a folder that cannot be written; the message names
-/// the step.
+/// No device, no revision in time, nothing that can be drawn, a [`crate::RefusedParameter`], or a folder that cannot be
+/// written; the message names the step.
 pub fn run_headless(options: &HeadlessOptions) -> anyhow::Result<HeadlessReport> {
     std::fs::create_dir_all(&options.out)
         .with_context(|| format!("making the folder {}", options.out.display()))?;
@@ -75,7 +78,8 @@ pub fn run_headless(options: &HeadlessOptions) -> anyhow::Result<HeadlessReport>
     let client = Client::connect(options.socket.clone(), "preview, headless");
     let revision = wait_for_revision(&client, options)?;
     let received_unix_ms = unix_ms();
-    let applied = viewer.apply(&revision);
+    viewer.apply(&revision);
+    let applied = viewer.assign(&options.parameters)?;
     let ready_unix_ms = unix_ms();
     ensure!(applied.shown.scene.is_some(), "revision {} has no scene to show", applied.revision);
     let mut report = begin_report(&viewer, &revision, applied, ready_unix_ms - received_unix_ms);

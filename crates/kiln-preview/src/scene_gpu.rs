@@ -8,7 +8,7 @@ use kiln_scene::{Image8, Primitive, Sampler, Scene};
 use wgpu::util::{BufferInitDescriptor, DeviceExt as _};
 
 use crate::mip::Average;
-use crate::slot::Map;
+use crate::slot::{Map, Neutral};
 use crate::texture::{create_sampler, create_trilinear_sampler, upload_image};
 
 /// A loaded scene: the CPU side without vertices and images, and the device's side.
@@ -19,6 +19,7 @@ pub(crate) struct GpuScene {
     textures: Vec<(wgpu::TextureView, wgpu::Sampler)>,
     neutral_white: wgpu::TextureView,
     neutral_normal: wgpu::TextureView,
+    neutral_brush: wgpu::TextureView,
     neutral_sampler: wgpu::Sampler,
 }
 
@@ -56,6 +57,8 @@ impl GpuScene {
             neutral_white: neutral("neutral white", [255; 4]),
             // 128 decodes to 0.0039 instead of 0: the nearest code, and shaders leave flat maps out anyway.
             neutral_normal: neutral("neutral normal", [128, 128, 255, 255]),
+            // The same code leaves the brush 0.2° off the tangent.
+            neutral_brush: neutral("neutral brush", [255, 128, 255, 255]),
             neutral_sampler: create_trilinear_sampler(gpu),
         })
     }
@@ -63,7 +66,11 @@ impl GpuScene {
     /// The texture and sampler that a material has for `map`, or neutral ones.
     pub fn texture(&self, material: &kiln_scene::Material, map: Map) -> (&wgpu::TextureView, &wgpu::Sampler) {
         let own = map.of(material).and_then(|texture| self.textures.get(texture.texture));
-        let neutral = if map.is_normal() { &self.neutral_normal } else { &self.neutral_white };
+        let neutral = match map.neutral() {
+            Neutral::White => &self.neutral_white,
+            Neutral::FlatNormal => &self.neutral_normal,
+            Neutral::AlongTangent => &self.neutral_brush,
+        };
         own.map_or((neutral, &self.neutral_sampler), |(view, sampler)| (view, sampler))
     }
 }

@@ -19,10 +19,26 @@ pub(crate) enum Map {
     Specular,
     SpecularColor,
     Transmission,
+    Anisotropy,
+    Iridescence,
+    IridescenceThickness,
+    Thickness,
+    DiffuseTransmission,
+    DiffuseTransmissionColor,
+}
+
+/// What is bound where a material has no texture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Neutral {
+    White,
+    /// The normal of the surface.
+    FlatNormal,
+    /// A brush of full strength along the tangent.
+    AlongTangent,
 }
 
 impl Map {
-    const ALL: [(Map, &'static str); 13] = [
+    const ALL: [(Map, &'static str); 19] = [
         (Map::BaseColor, "base_color"),
         (Map::MetallicRoughness, "metallic_roughness"),
         (Map::Normal, "normal"),
@@ -36,6 +52,12 @@ impl Map {
         (Map::Specular, "specular"),
         (Map::SpecularColor, "specular_color"),
         (Map::Transmission, "transmission"),
+        (Map::Anisotropy, "anisotropy"),
+        (Map::Iridescence, "iridescence"),
+        (Map::IridescenceThickness, "iridescence_thickness"),
+        (Map::Thickness, "thickness"),
+        (Map::DiffuseTransmission, "diffuse_transmission"),
+        (Map::DiffuseTransmissionColor, "diffuse_transmission_color"),
     ];
 
     /// The map named `name`, as `base_color`.
@@ -59,12 +81,22 @@ impl Map {
             Map::Specular => material.specular_texture,
             Map::SpecularColor => material.specular_color_texture,
             Map::Transmission => material.transmission_texture,
+            Map::Anisotropy => material.anisotropy_texture,
+            Map::Iridescence => material.iridescence_texture,
+            Map::IridescenceThickness => material.iridescence_thickness_texture,
+            Map::Thickness => material.thickness_texture,
+            Map::DiffuseTransmission => material.diffuse_transmission_texture,
+            Map::DiffuseTransmissionColor => material.diffuse_transmission_color_texture,
         }
     }
 
-    /// Whether it holds tangent-space directions, whose neutral texel is (0.5, 0.5, 1) and not white.
-    pub fn is_normal(self) -> bool {
-        matches!(self, Map::Normal | Map::ClearcoatNormal)
+    /// What stands in for it: it leaves the factors as they are.
+    pub fn neutral(self) -> Neutral {
+        match self {
+            Map::Normal | Map::ClearcoatNormal => Neutral::FlatNormal,
+            Map::Anisotropy => Neutral::AlongTangent,
+            _ => Neutral::White,
+        }
     }
 }
 

@@ -2,8 +2,9 @@
 
 use glam::{Mat3, Mat4, Vec3};
 use kiln_scene::{AlphaMode, Material, TextureRef};
-use kiln_shader::{Member, Parameter};
+use kiln_shader::Member;
 
+use crate::parameter::{OfferedParameter, ParameterValues};
 use crate::slot::Map;
 
 /// A value that a uniform member can take.
@@ -109,6 +110,18 @@ pub(crate) fn material_member(material: &Material, name: &str) -> Option<Value> 
         "sheen_color_factor" => Value::Vec3(material.sheen_color_factor),
         "sheen_roughness_factor" => material.sheen_roughness_factor.into(),
         "transmission_factor" => material.transmission_factor.into(),
+        "anisotropy_strength" => material.anisotropy_strength.into(),
+        "anisotropy_rotation" => material.anisotropy_rotation.into(),
+        "iridescence_factor" => material.iridescence_factor.into(),
+        "iridescence_ior" => material.iridescence_ior.into(),
+        "iridescence_thickness_minimum" => material.iridescence_thickness_minimum.into(),
+        "iridescence_thickness_maximum" => material.iridescence_thickness_maximum.into(),
+        "thickness_factor" => material.thickness_factor.into(),
+        "attenuation_distance" => attenuation_distance(material).into(),
+        "attenuation_color" => Value::Vec3(material.attenuation_color),
+        "dispersion" => material.dispersion.into(),
+        "diffuse_transmission_factor" => material.diffuse_transmission_factor.into(),
+        "diffuse_transmission_color_factor" => Value::Vec3(material.diffuse_transmission_color_factor),
         _ => return uv_member(material, name),
     })
 }
@@ -118,6 +131,11 @@ fn alpha_cutoff(material: &Material) -> f32 {
         AlphaMode::Mask { cutoff } => cutoff,
         AlphaMode::Opaque | AlphaMode::Blend => 0.0,
     }
+}
+
+/// WGSL promises nothing about infinite values: 0, which no medium has, stands for them.
+fn attenuation_distance(material: &Material) -> f32 {
+    if material.attenuation_distance.is_finite() { material.attenuation_distance } else { 0.0 }
 }
 
 /// `X_uv_u` and `X_uv_v`: the rows of the texture's affine map, the UV set in `X_uv_u.w`.
@@ -176,28 +194,26 @@ pub(crate) fn fill_block(
     block
 }
 
-/// The bytes of the author's own uniform block: each parameter's first value at its member, zeros elsewhere. A member with
-/// more components than the value has ones there, as the alpha of a colour.
-pub(crate) fn parameter_block(size_bytes: u32, members: &[Member], parameters: &[Parameter]) -> Vec<u8> {
+/// The bytes of the author's own uniform block: each parameter's value at its member, zeros elsewhere. A member with more
+/// components than the value has ones there, as the alpha of a colour.
+pub(crate) fn parameter_block(
+    size_bytes: u32,
+    fields: &[(Member, OfferedParameter)],
+    values: &ParameterValues,
+) -> Vec<u8> {
     let mut block = vec![0; size_bytes as usize];
-    for member in members {
-        let Some(parameter) = parameters.iter().find(|parameter| parameter.name == member.name) else {
-            continue;
-        };
-        let components = (member.size_bytes as usize / 4).min(4);
-        let ty = long_type_name(&member.ty);
-        for index in 0..components {
-            let value = parameter.default.get(index).copied().unwrap_or(1.0);
-            let bytes = match &*ty {
-                ty if ty.contains("f32") => (value as f32).to_le_bytes(),
-                ty if ty.contains("i32") => (value as i32).to_le_bytes(),
-                _ => (value as u32).to_le_bytes(),
-            };
-            let start = member.offset_bytes as usize + 4 * index;
-            if let Some(place) = block.get_mut(start..start + 4) {
-                place.copy_from_slice(&bytes);
+    for (member, parameter) in fields {
+        let value = values.of(parameter);
+        let words = block.iter_mut().skip(member.offset_bytes as usize).take(member.size_bytes as usize);
+        let bytes = (0..member.size_bytes as usize / 4).flat_map(|index| {
+            let component = value.get(index).copied().unwrap_or(1.0);
+            match &*member.ty {
+                ty if ty.contains("i32") => (component as i32).to_le_bytes(),
+                ty if ty.contains("u32") => (component as u32).to_le_bytes(),
+                _ => (component as f32).to_le_bytes(),
             }
-        }
+        });
+        words.zip(bytes).for_each(|(place, byte)| *place = byte);
     }
     block
 }

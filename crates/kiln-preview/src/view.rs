@@ -1,6 +1,7 @@
 //! What the user sets: which scene under which light, seen how.
 
 use crate::camera::OrbitCamera;
+use crate::parameter::ParameterValues;
 
 /// Which scene and environment to show.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -26,6 +27,8 @@ pub struct View {
     pub camera: Option<OrbitCamera>,
     /// Seconds for shaders that move; 0 in headless frames.
     pub time_s: f32,
+    /// The parameters that shaders' authors offer.
+    pub parameters: ParameterValues,
 }
 
 impl Default for View {
@@ -38,6 +41,7 @@ impl Default for View {
             background_blur: 0.0,
             camera: None,
             time_s: 0.0,
+            parameters: ParameterValues::default(),
         }
     }
 }

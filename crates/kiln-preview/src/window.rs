@@ -13,6 +13,7 @@ use crate::connection::{Connection, Heard};
 use crate::frame_watcher::FrameWatcher;
 use crate::live_picture::LivePicture;
 use crate::panel::{self, PanelState, Progress};
+use crate::parameter::ParameterValues;
 use crate::theme;
 use crate::view::{Selection, View};
 use crate::worker::{Request, Worker};
@@ -71,7 +72,7 @@ struct Window {
     panels: PanelState,
     revision: Option<(Arc<Revision>, f64)>,
     /// What the worker was last asked for.
-    requested: Selection,
+    requested: (Selection, ParameterValues),
 }
 
 impl Window {
@@ -97,7 +98,7 @@ impl Window {
             worker,
             panels,
             revision: None,
-            requested: options.selection,
+            requested: (options.selection, ParameterValues::default()),
         })
     }
 
@@ -136,12 +137,18 @@ impl Window {
         self.request();
     }
 
+    /// What has to be prepared.
+    fn wanted(&self) -> (Selection, ParameterValues) {
+        (self.panels.selection.clone(), self.panels.view.parameters.overrides())
+    }
+
     fn request(&mut self) {
-        self.requested = self.panels.selection.clone();
+        self.requested = self.wanted();
         if let Some((revision, received_unix_ms)) = &self.revision {
             self.worker.request(Request {
                 revision: Arc::clone(revision),
-                selection: self.requested.clone(),
+                selection: self.requested.0.clone(),
+                overrides: self.requested.1.clone(),
                 received_unix_ms: *received_unix_ms,
             });
         }
@@ -153,7 +160,7 @@ impl eframe::App for Window {
         self.take_news();
         let Window { panels, picture, .. } = self;
         panel::show(ui, panels, |ui, state| picture.show(ui, state));
-        if self.panels.selection != self.requested {
+        if self.wanted() != self.requested {
             self.request();
         }
     }

@@ -8,6 +8,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use kiln_gpu::Gpu;
 use kiln_link::Revision;
 
+use crate::parameter::ParameterValues;
 use crate::prepare::{Prepared, Preparer};
 use crate::view::Selection;
 
@@ -19,6 +20,8 @@ const STACK_BYTES: usize = 16 << 20;
 pub(crate) struct Request {
     pub revision: Arc<Revision>,
     pub selection: Selection,
+    /// What overrides are set to.
+    pub overrides: ParameterValues,
     /// When the whole revision was here.
     pub received_unix_ms: f64,
 }
@@ -79,7 +82,8 @@ fn prepare_newest(gpu: &Gpu, requests: &Receiver<Request>, ready: &Mutex<Option<
     let mut preparer = Preparer::new(gpu);
     while let Ok(request) = requests.recv() {
         let request = requests.try_iter().last().unwrap_or(request);
-        let Some(prepared) = preparer.prepare(&request.revision, &request.selection) else { continue };
+        let Request { revision, selection, overrides, .. } = &request;
+        let Some(prepared) = preparer.prepare(revision, selection, overrides) else { continue };
         gpu.queue.submit([]);
         // A lost device is shown by the window; there is nothing to wait for then.
         drop(gpu.wait());

@@ -6,11 +6,15 @@ use crate::{Effect, EffectSet};
 
 impl Effect {
     /// Every effect, in the order of their names.
-    pub const ALL: [Effect; 11] = [
+    pub const ALL: [Effect; 16] = [
         Effect::AlphaBlend,
         Effect::AlphaMask,
+        Effect::Anisotropy,
         Effect::Clearcoat,
+        Effect::DiffuseTransmission,
+        Effect::Dispersion,
         Effect::Emission,
+        Effect::Iridescence,
         Effect::NormalMap,
         Effect::Occlusion,
         Effect::Sheen,
@@ -18,6 +22,7 @@ impl Effect {
         Effect::Transmission,
         Effect::Unlit,
         Effect::VertexColor,
+        Effect::Volume,
     ];
 
     /// The feature that a shader is compiled with.
@@ -25,8 +30,12 @@ impl Effect {
         match self {
             Effect::AlphaBlend => "alpha_blend",
             Effect::AlphaMask => "alpha_mask",
+            Effect::Anisotropy => "anisotropy",
             Effect::Clearcoat => "clearcoat",
+            Effect::DiffuseTransmission => "diffuse_transmission",
+            Effect::Dispersion => "dispersion",
             Effect::Emission => "emission",
+            Effect::Iridescence => "iridescence",
             Effect::NormalMap => "normal_map",
             Effect::Occlusion => "occlusion",
             Effect::Sheen => "sheen",
@@ -34,6 +43,7 @@ impl Effect {
             Effect::Transmission => "transmission",
             Effect::Unlit => "unlit",
             Effect::VertexColor => "vertex_color",
+            Effect::Volume => "volume",
         }
     }
 

@@ -8,15 +8,20 @@ use crate::schema::{Material, Root};
 const SUPPORTED: &[&str] = &[
     "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
+    "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    "KHR_materials_iridescence",
     "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_sheen",
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
     "KHR_materials_variants",
+    "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_node_visibility",
     "KHR_texture_transform",
@@ -35,11 +40,6 @@ const NOTED_ELSEWHERE: &[&str] = &[
     "EXT_texture_webp",
     "KHR_animation_pointer",
     "KHR_draco_mesh_compression",
-    "KHR_materials_anisotropy",
-    "KHR_materials_diffuse_transmission",
-    "KHR_materials_dispersion",
-    "KHR_materials_iridescence",
-    "KHR_materials_volume",
     "KHR_meshopt_compression",
     "KHR_texture_basisu",
 ];
@@ -87,14 +87,6 @@ pub(crate) fn material_notes(name: &str, material: &Material) -> Vec<String> {
         return Vec::new();
     }
     let asked = [
-        (ext.anisotropy.is_some_and(|it| it.anisotropy_strength != 0.0), "anisotropy is not drawn"),
-        (ext.iridescence.is_some_and(|it| it.iridescence_factor > 0.0), "iridescence is not drawn"),
-        (ext.volume.is_some_and(|it| it.thickness_factor > 0.0), "volume is not drawn: it is thin-walled"),
-        (ext.dispersion.is_some_and(|it| it.dispersion > 0.0), "dispersion is not drawn"),
-        (
-            ext.diffuse_transmission.is_some_and(|it| it.diffuse_transmission_factor > 0.0),
-            "diffuse transmission is not drawn",
-        ),
         (
             ext.transmission.as_ref().is_some_and(|it| it.transmission_factor > 0.0),
             "transmission is approximated: only the environment shows through",
@@ -103,14 +95,4 @@ pub(crate) fn material_notes(name: &str, material: &Material) -> Vec<String> {
     ];
     let asked = asked.into_iter().filter(|(is_asked, _)| *is_asked);
     asked.map(|(_, what)| format!("material `{name}`: {what}")).collect()
-}
-
-/// Takes out what [`material_notes`] spoke of and nothing draws.
-pub(crate) fn forget_noted(material: &mut Material) {
-    let ext = &mut material.extensions;
-    ext.anisotropy = None;
-    ext.iridescence = None;
-    ext.volume = None;
-    ext.dispersion = None;
-    ext.diffuse_transmission = None;
 }

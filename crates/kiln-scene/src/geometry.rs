@@ -24,8 +24,9 @@ pub(crate) const NEUTRAL: Vertex = Vertex {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Needs {
     pub normals: bool,
-    /// The normal texture's UV set and placement.
+    /// The UV set and placement that tangents follow.
     pub tangents: Option<crate::TextureRef>,
+    /// UV sets of textures.
     pub uv: [bool; 2],
 }
 
@@ -182,8 +183,11 @@ impl Reader<'_, '_> {
             (Some(_), Some(_)) => get("TANGENT", &["VEC4"])?,
             _ => None,
         };
-        let uv0 = if needs.uv[0] { get("TEXCOORD_0", &["VEC2"])? } else { None };
-        let uv1 = if needs.uv[1] { get("TEXCOORD_1", &["VEC2"])? } else { None };
+        // Tangents that are not given are made along a set that no texture may read.
+        let placed = needs.tangents.filter(|_| tangents.is_none()).map(|placed| placed.uv_set as usize);
+        let reads = |set: usize| needs.uv[set] || placed == Some(set);
+        let uv0 = if reads(0) { get("TEXCOORD_0", &["VEC2"])? } else { None };
+        let uv1 = if reads(1) { get("TEXCOORD_1", &["VEC2"])? } else { None };
         let colors = get("COLOR_0", &["VEC3", "VEC4"])?;
         for (at, vertex) in vertices.iter_mut().enumerate() {
             if let Some(&[x, y, z, _]) = normals.as_ref().map(|normals| &normals[at]) {

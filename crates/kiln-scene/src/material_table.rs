@@ -83,7 +83,6 @@ impl<'a, 'b> MaterialTable<'a, 'b> {
 
     fn prepare(&mut self, mut material: schema::Material, name: String, place: &str) -> Slot {
         let mut notes = extensions::material_notes(&name, &material);
-        extensions::forget_noted(&mut material);
         let textures = &mut self.textures;
         let mut keep = |info: &mut TextureInfo, _: ColorSpace| {
             let set = uv_set(info);
@@ -158,13 +157,20 @@ fn needs(pruned: &Pruned) -> Needs {
         uv[uv_set(info) as usize] = true;
         true
     });
-    let coat = material.extensions.clearcoat.as_ref().and_then(|coat| coat.clearcoat_normal_texture.as_ref());
-    let normal_texture = material.normal_texture.as_ref().or(coat);
-    Needs {
-        normals: material.extensions.unlit.is_none(),
-        tangents: normal_texture.map(|texture| texture_ref(&texture.info)),
-        uv,
-    }
+    Needs { normals: material.extensions.unlit.is_none(), tangents: tangent_space(&material), uv }
+}
+
+/// Where the tangents of a mesh without any come from: the placement of the first texture that is read through them. A
+/// brush without a texture runs along the first UV set (`KHR_materials_anisotropy`).
+fn tangent_space(material: &schema::Material) -> Option<TextureRef> {
+    let ext = &material.extensions;
+    let coat = ext.clearcoat.as_ref().and_then(|coat| coat.clearcoat_normal_texture.as_ref());
+    let normal = material.normal_texture.as_ref().or(coat).map(|texture| texture_ref(&texture.info));
+    let brush = ext.anisotropy.as_ref().map(|brush| match &brush.anisotropy_texture {
+        Some(info) => texture_ref(info),
+        None => texture_ref(&TextureInfo::default()),
+    });
+    normal.or(brush)
 }
 
 /// What the vertex colours of some primitives are like.

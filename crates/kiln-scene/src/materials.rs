@@ -20,6 +20,10 @@ pub(crate) fn flatten(
     let sheen = extensions.sheen.clone().unwrap_or_default();
     let specular = extensions.specular.clone().unwrap_or_default();
     let transmission = extensions.transmission.clone().unwrap_or_default();
+    let anisotropy = extensions.anisotropy.clone().unwrap_or_default();
+    let film = extensions.iridescence.clone().unwrap_or_default();
+    let volume = extensions.volume.clone().unwrap_or_default();
+    let diffuse = extensions.diffuse_transmission.clone().unwrap_or_default();
     let strength = extensions.emissive_strength.as_ref().map_or(1.0, |it| it.emissive_strength);
     let coat_normal = clearcoat.clearcoat_normal_texture.as_ref();
     Material {
@@ -39,6 +43,18 @@ pub(crate) fn flatten(
         sheen_color_factor: sheen.sheen_color_factor,
         sheen_roughness_factor: sheen.sheen_roughness_factor,
         transmission_factor: transmission.transmission_factor,
+        anisotropy_strength: anisotropy.anisotropy_strength,
+        anisotropy_rotation: anisotropy.anisotropy_rotation,
+        iridescence_factor: film.iridescence_factor,
+        iridescence_ior: film.iridescence_ior,
+        iridescence_thickness_minimum: film.iridescence_thickness_minimum,
+        iridescence_thickness_maximum: film.iridescence_thickness_maximum,
+        thickness_factor: volume.thickness_factor,
+        attenuation_distance: volume.attenuation_distance.unwrap_or(f32::INFINITY),
+        attenuation_color: volume.attenuation_color,
+        dispersion: extensions.dispersion.unwrap_or_default().dispersion,
+        diffuse_transmission_factor: diffuse.diffuse_transmission_factor,
+        diffuse_transmission_color_factor: diffuse.diffuse_transmission_color_factor,
         alpha_mode: alpha_mode(source),
         double_sided: source.double_sided,
         base_color_texture: at(base.base_color_texture.as_ref(), Srgb),
@@ -54,6 +70,12 @@ pub(crate) fn flatten(
         specular_texture: at(specular.specular_texture.as_ref(), Linear),
         specular_color_texture: at(specular.specular_color_texture.as_ref(), Srgb),
         transmission_texture: at(transmission.transmission_texture.as_ref(), Linear),
+        anisotropy_texture: at(anisotropy.anisotropy_texture.as_ref(), Linear),
+        iridescence_texture: at(film.iridescence_texture.as_ref(), Linear),
+        iridescence_thickness_texture: at(film.iridescence_thickness_texture.as_ref(), Linear),
+        thickness_texture: at(volume.thickness_texture.as_ref(), Linear),
+        diffuse_transmission_texture: at(diffuse.diffuse_transmission_texture.as_ref(), Linear),
+        diffuse_transmission_color_texture: at(diffuse.diffuse_transmission_color_texture.as_ref(), Srgb),
         effects,
     }
 }

@@ -55,6 +55,24 @@ pub(crate) fn prune(mut material: Material, look: Look<'_>) -> Pruned {
     if !keep(Effect::Transmission, transmits) {
         material.extensions.transmission = None;
     }
+    let scatters = !metal && scatters(&material, look);
+    if !keep(Effect::DiffuseTransmission, scatters) {
+        material.extensions.diffuse_transmission = None;
+    }
+    // What lets no light in has no inside, and walls without an inside bend no light.
+    let has_inside = (transmits || scatters) && is_thick(&material, look);
+    if !keep(Effect::Volume, has_inside) {
+        material.extensions.volume = None;
+    }
+    if !keep(Effect::Dispersion, transmits && has_inside && disperses(&material)) {
+        material.extensions.dispersion = None;
+    }
+    if !keep(Effect::Anisotropy, is_brushed(&material, look)) {
+        material.extensions.anisotropy = None;
+    }
+    if !keep(Effect::Iridescence, has_film(&material, look)) {
+        material.extensions.iridescence = None;
+    }
     // A metal reflects its base colour, so the dielectric layer's strength and colour do not show.
     if !keep(Effect::Specular, !metal && has_specular(&material, look)) {
         material.extensions.specular = None;
@@ -113,6 +131,20 @@ pub(crate) fn retain_textures(
     }
     if let Some(transmission) = &mut material.extensions.transmission {
         retain(&mut transmission.transmission_texture, Linear, keep);
+    }
+    if let Some(anisotropy) = &mut material.extensions.anisotropy {
+        retain(&mut anisotropy.anisotropy_texture, Linear, keep);
+    }
+    if let Some(film) = &mut material.extensions.iridescence {
+        retain(&mut film.iridescence_texture, Linear, keep);
+        retain(&mut film.iridescence_thickness_texture, Linear, keep);
+    }
+    if let Some(volume) = &mut material.extensions.volume {
+        retain(&mut volume.thickness_texture, Linear, keep);
+    }
+    if let Some(diffuse) = &mut material.extensions.diffuse_transmission {
+        retain(&mut diffuse.diffuse_transmission_texture, Linear, keep);
+        retain(&mut diffuse.diffuse_transmission_color_texture, Srgb, keep);
     }
 }
 
@@ -186,6 +218,28 @@ fn clamp(material: &mut Material) {
     if let Some(transmission) = &mut material.extensions.transmission {
         unit(&mut transmission.transmission_factor);
     }
+    let positive = |value: &mut f32| *value = value.max(0.0);
+    if let Some(anisotropy) = &mut material.extensions.anisotropy {
+        unit(&mut anisotropy.anisotropy_strength);
+    }
+    if let Some(film) = &mut material.extensions.iridescence {
+        unit(&mut film.iridescence_factor);
+        film.iridescence_ior = film.iridescence_ior.max(1.0);
+        positive(&mut film.iridescence_thickness_minimum);
+        positive(&mut film.iridescence_thickness_maximum);
+    }
+    if let Some(volume) = &mut material.extensions.volume {
+        positive(&mut volume.thickness_factor);
+        volume.attenuation_color.iter_mut().for_each(unit);
+        volume.attenuation_distance = volume.attenuation_distance.filter(|it| *it > 0.0);
+    }
+    if let Some(dispersion) = &mut material.extensions.dispersion {
+        positive(&mut dispersion.dispersion);
+    }
+    if let Some(diffuse) = &mut material.extensions.diffuse_transmission {
+        unit(&mut diffuse.diffuse_transmission_factor);
+        diffuse.diffuse_transmission_color_factor.iter_mut().for_each(positive);
+    }
     if let Some(ior) = &mut material.extensions.ior {
         // 0 is the extension's own way to say a Fresnel term of 1.
         ior.ior = if ior.ior == 0.0 { 0.0 } else { ior.ior.max(1.0) };
@@ -239,6 +293,45 @@ fn transmits(material: &Material, look: Look<'_>) -> bool {
     let transmission = material.extensions.transmission.as_ref();
     transmission.is_some_and(|it| {
         it.transmission_factor * channel_max(it.transmission_texture.as_ref(), 0, look) > 0.0
+    })
+}
+
+/// The texture's alpha is the share that scatters through.
+fn scatters(material: &Material, look: Look<'_>) -> bool {
+    let diffuse = material.extensions.diffuse_transmission.as_ref();
+    diffuse.is_some_and(|it| {
+        it.diffuse_transmission_factor * channel_max(it.diffuse_transmission_texture.as_ref(), 3, look) > 0.0
+    })
+}
+
+fn is_thick(material: &Material, look: Look<'_>) -> bool {
+    let volume = material.extensions.volume.as_ref();
+    volume.is_some_and(|it| it.thickness_factor * channel_max(it.thickness_texture.as_ref(), 1, look) > 0.0)
+}
+
+/// The spread of indices is in proportion to what they are above 1.
+fn disperses(material: &Material) -> bool {
+    let ior = material.extensions.ior.as_ref().map_or(1.5, |it| it.ior);
+    ior > 1.0 && material.extensions.dispersion.is_some_and(|it| it.dispersion > 0.0)
+}
+
+fn is_brushed(material: &Material, look: Look<'_>) -> bool {
+    let anisotropy = material.extensions.anisotropy.as_ref();
+    anisotropy
+        .is_some_and(|it| it.anisotropy_strength * channel_max(it.anisotropy_texture.as_ref(), 2, look) > 0.0)
+}
+
+/// A film without thickness is none.
+fn has_film(material: &Material, look: Look<'_>) -> bool {
+    material.extensions.iridescence.as_ref().is_some_and(|it| {
+        let least = it.iridescence_thickness_texture.as_ref().map_or(1.0, |info| unit(look(info).min[1]));
+        let thickness_max = if least < 1.0 {
+            it.iridescence_thickness_minimum.max(it.iridescence_thickness_maximum)
+        } else {
+            it.iridescence_thickness_maximum
+        };
+        let factor = it.iridescence_factor * channel_max(it.iridescence_texture.as_ref(), 0, look);
+        factor > 0.0 && thickness_max > 0.0
     })
 }
 

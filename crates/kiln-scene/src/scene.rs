@@ -86,10 +86,18 @@ pub enum Effect {
     AlphaMask,
     /// Blended over what lies behind.
     AlphaBlend,
+    /// Reflections stretched along a direction of the surface.
+    Anisotropy,
     /// A second specular layer on top.
     Clearcoat,
+    /// Light scattered to the other side.
+    DiffuseTransmission,
+    /// Refraction that differs between colours; never without [`Effect::Volume`].
+    Dispersion,
     /// Light of its own.
     Emission,
+    /// A thin film whose colour depends on the view.
+    Iridescence,
     /// Tangent-space normal texture that is not flat.
     NormalMap,
     /// Occlusion texture.
@@ -104,6 +112,8 @@ pub enum Effect {
     Unlit,
     /// `COLOR_0` multiplies the base colour.
     VertexColor,
+    /// An inside that light passes through, of some thickness.
+    Volume,
 }
 
 /// Effects of a material, sorted: the shader variant it is drawn with.
@@ -144,6 +154,24 @@ pub struct Material {
     pub sheen_color_factor: [f32; 3],
     pub sheen_roughness_factor: f32,
     pub transmission_factor: f32,
+    pub anisotropy_strength: f32,
+    /// Radians, counter-clockwise from the tangent.
+    pub anisotropy_rotation: f32,
+    pub iridescence_factor: f32,
+    pub iridescence_ior: f32,
+    /// Nanometres, where the thickness texture is 0.
+    pub iridescence_thickness_minimum: f32,
+    /// Nanometres, where the thickness texture is 1 or absent.
+    pub iridescence_thickness_maximum: f32,
+    /// Units of the object, not of the world.
+    pub thickness_factor: f32,
+    /// World units; infinite where nothing is absorbed.
+    pub attenuation_distance: f32,
+    pub attenuation_color: [f32; 3],
+    /// 20 over the Abbe number.
+    pub dispersion: f32,
+    pub diffuse_transmission_factor: f32,
+    pub diffuse_transmission_color_factor: [f32; 3],
     pub alpha_mode: AlphaMode,
     pub double_sided: bool,
     pub base_color_texture: Option<TextureRef>,
@@ -159,6 +187,12 @@ pub struct Material {
     pub specular_texture: Option<TextureRef>,
     pub specular_color_texture: Option<TextureRef>,
     pub transmission_texture: Option<TextureRef>,
+    pub anisotropy_texture: Option<TextureRef>,
+    pub iridescence_texture: Option<TextureRef>,
+    pub iridescence_thickness_texture: Option<TextureRef>,
+    pub thickness_texture: Option<TextureRef>,
+    pub diffuse_transmission_texture: Option<TextureRef>,
+    pub diffuse_transmission_color_texture: Option<TextureRef>,
     /// Decided from values, not from names: an extension without effect is not here.
     pub effects: EffectSet,
 }

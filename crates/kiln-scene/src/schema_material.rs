@@ -74,15 +74,15 @@ pub(crate) struct MaterialExtensions {
     pub emissive_strength: Option<EmissiveStrength>,
     #[serde(rename = "KHR_materials_pbrSpecularGlossiness", default, skip_serializing)]
     pub specular_glossiness: Option<SpecularGlossiness>,
-    #[serde(rename = "KHR_materials_anisotropy", default, skip_serializing)]
+    #[serde(rename = "KHR_materials_anisotropy", default, skip_serializing_if = "Option::is_none")]
     pub anisotropy: Option<Anisotropy>,
-    #[serde(rename = "KHR_materials_iridescence", default, skip_serializing)]
+    #[serde(rename = "KHR_materials_iridescence", default, skip_serializing_if = "Option::is_none")]
     pub iridescence: Option<Iridescence>,
-    #[serde(rename = "KHR_materials_volume", default, skip_serializing)]
+    #[serde(rename = "KHR_materials_volume", default, skip_serializing_if = "Option::is_none")]
     pub volume: Option<Volume>,
-    #[serde(rename = "KHR_materials_dispersion", default, skip_serializing)]
+    #[serde(rename = "KHR_materials_dispersion", default, skip_serializing_if = "Option::is_none")]
     pub dispersion: Option<Dispersion>,
-    #[serde(rename = "KHR_materials_diffuse_transmission", default, skip_serializing)]
+    #[serde(rename = "KHR_materials_diffuse_transmission", default, skip_serializing_if = "Option::is_none")]
     pub diffuse_transmission: Option<DiffuseTransmission>,
 }
 
@@ -188,22 +188,64 @@ impl Default for SpecularGlossiness {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(crate) struct Anisotropy {
     pub anisotropy_strength: f32,
+    #[serde(skip_serializing_if = "is_default")]
+    pub anisotropy_rotation: f32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub anisotropy_texture: Option<TextureInfo>,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(crate) struct Iridescence {
     pub iridescence_factor: f32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub iridescence_texture: Option<TextureInfo>,
+    pub iridescence_ior: f32,
+    pub iridescence_thickness_minimum: f32,
+    pub iridescence_thickness_maximum: f32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub iridescence_thickness_texture: Option<TextureInfo>,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
+impl Default for Iridescence {
+    fn default() -> Self {
+        Iridescence {
+            iridescence_factor: 0.0,
+            iridescence_texture: None,
+            iridescence_ior: 1.3,
+            iridescence_thickness_minimum: 100.0,
+            iridescence_thickness_maximum: 400.0,
+            iridescence_thickness_texture: None,
+        }
+    }
+}
+
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(crate) struct Volume {
     pub thickness_factor: f32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub thickness_texture: Option<TextureInfo>,
+    /// `None` is glTF's default: infinitely far.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub attenuation_distance: Option<f32>,
+    #[serde(skip_serializing_if = "is_white")]
+    pub attenuation_color: [f32; 3],
+}
+
+impl Default for Volume {
+    fn default() -> Self {
+        Volume {
+            thickness_factor: 0.0,
+            thickness_texture: None,
+            attenuation_distance: None,
+            attenuation_color: white(),
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
@@ -212,10 +254,27 @@ pub(crate) struct Dispersion {
     pub dispersion: f32,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(crate) struct DiffuseTransmission {
     pub diffuse_transmission_factor: f32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub diffuse_transmission_texture: Option<TextureInfo>,
+    #[serde(skip_serializing_if = "is_white")]
+    pub diffuse_transmission_color_factor: [f32; 3],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub diffuse_transmission_color_texture: Option<TextureInfo>,
+}
+
+impl Default for DiffuseTransmission {
+    fn default() -> Self {
+        DiffuseTransmission {
+            diffuse_transmission_factor: 0.0,
+            diffuse_transmission_texture: None,
+            diffuse_transmission_color_factor: white(),
+            diffuse_transmission_color_texture: None,
+        }
+    }
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]

@@ -47,6 +47,7 @@ pub(crate) fn finish(mut geometry: Geometry, needs: Needs) -> (Geometry, Vec<Str
         if !geometry.has_tangents {
             unshare(&mut geometry);
             tangents::generate(&mut geometry, placement);
+            forget_uvs(&mut geometry, needs.uv);
             split = true;
         }
         remark(repair_tangents(&mut geometry), "vertices without a usable tangent got an arbitrary one");
@@ -56,6 +57,18 @@ pub(crate) fn finish(mut geometry: Geometry, needs: Needs) -> (Geometry, Vec<Str
     }
     compact(&mut geometry);
     (geometry, remarks)
+}
+
+/// Drops coordinates that were read for the tangents alone.
+fn forget_uvs(geometry: &mut Geometry, needed: [bool; 2]) {
+    for vertex in &mut geometry.vertices {
+        if !needed[0] {
+            vertex.uv0 = [0.0; 2];
+        }
+        if !needed[1] {
+            vertex.uv1 = [0.0; 2];
+        }
+    }
 }
 
 /// The mirror image about x = 0: `world · diag(−1, 1, 1)` with it shows what `world` with `geometry` does.

@@ -171,7 +171,9 @@ struct Column {
 /// would be made up by whoever reads the pack, so they are written even where they are neutral.
 fn columns(vertices: &[Vertex], material: &Material) -> Vec<Column> {
     let lit = !material.effects.contains(&Effect::Unlit);
-    let mapped = material.normal_texture.is_some() || material.clearcoat_normal_texture.is_some();
+    let mapped = material.normal_texture.is_some()
+        || material.clearcoat_normal_texture.is_some()
+        || material.effects.contains(&Effect::Anisotropy);
     let all = [
         (true, Column { name: "POSITION", width: 3, read: |v| pad(v.position) }),
         (lit, Column { name: "NORMAL", width: 3, read: |v| pad(v.normal) }),
@@ -204,13 +206,18 @@ fn extensions_used(root: &Root) -> Vec<String> {
     let any =
         |test: fn(&schema::MaterialExtensions) -> bool| root.materials.iter().any(|it| test(&it.extensions));
     add(root.extensions.lights.is_some(), "KHR_lights_punctual");
+    add(any(|it| it.anisotropy.is_some()), "KHR_materials_anisotropy");
     add(any(|it| it.clearcoat.is_some()), "KHR_materials_clearcoat");
+    add(any(|it| it.diffuse_transmission.is_some()), "KHR_materials_diffuse_transmission");
+    add(any(|it| it.dispersion.is_some()), "KHR_materials_dispersion");
     add(any(|it| it.emissive_strength.is_some()), "KHR_materials_emissive_strength");
     add(any(|it| it.ior.is_some()), "KHR_materials_ior");
+    add(any(|it| it.iridescence.is_some()), "KHR_materials_iridescence");
     add(any(|it| it.sheen.is_some()), "KHR_materials_sheen");
     add(any(|it| it.specular.is_some()), "KHR_materials_specular");
     add(any(|it| it.transmission.is_some()), "KHR_materials_transmission");
     add(any(|it| it.unlit.is_some()), "KHR_materials_unlit");
+    add(any(|it| it.volume.is_some()), "KHR_materials_volume");
     let mut transformed = false;
     for material in &root.materials {
         crate::prune::retain_textures(&mut material.clone(), &mut |info, _| {

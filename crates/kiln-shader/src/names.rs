@@ -56,7 +56,7 @@ pub const FRAME_MEMBERS: [&str; 13] = [
 ];
 
 /// Members of the uniform `material`, besides `X_uv_u` and `X_uv_v`.
-pub const MATERIAL_MEMBERS: [&str; 27] = [
+pub const MATERIAL_MEMBERS: [&str; 28] = [
     "base_color_factor",
     "metallic_factor",
     "roughness_factor",
@@ -77,6 +77,7 @@ pub const MATERIAL_MEMBERS: [&str; 27] = [
     "anisotropy_rotation",
     "iridescence_factor",
     "iridescence_ior",
+    "iridescence_thickness_minimum",
     "iridescence_thickness_maximum",
     "thickness_factor",
     "attenuation_distance",
@@ -90,7 +91,7 @@ pub const MATERIAL_MEMBERS: [&str; 27] = [
 pub const DRAW_MEMBERS: [&str; 2] = ["world_from_object", "world_from_object_normal"];
 
 /// The X of `X_texture`, `X_sampler`, `X_uv_u` and `X_uv_v`.
-pub const MATERIAL_TEXTURES: [&str; 13] = [
+pub const MATERIAL_TEXTURES: [&str; 19] = [
     "base_color",
     "metallic_roughness",
     "normal",
@@ -104,6 +105,12 @@ pub const MATERIAL_TEXTURES: [&str; 13] = [
     "specular",
     "specular_color",
     "transmission",
+    "anisotropy",
+    "iridescence",
+    "iridescence_thickness",
+    "thickness",
+    "diffuse_transmission",
+    "diffuse_transmission_color",
 ];
 
 /// Textures and samplers of the frame.

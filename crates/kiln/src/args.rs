@@ -357,7 +357,7 @@ pub(crate) struct PreviewArgs {
     #[arg(long, default_value_t = 1, requires = "headless")]
     pub(crate) frames: usize,
     /// Go on: write revision_0001.png … for every revision until ended, through daemons that come and go
-    #[arg(long, requires = "headless", conflicts_with_all = ["frames", "turn", "json"])]
+    #[arg(long, requires = "headless", conflicts_with_all = ["frames", "turn", "json", "param"])]
     pub(crate) follow: bool,
     /// Folder for frame_0001.png … and report.json
     #[arg(long, default_value = "frames", requires = "headless")]
@@ -383,6 +383,9 @@ pub(crate) struct PreviewArgs {
     /// Exposure in stops
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     pub(crate) exposure: f32,
+    /// Set a parameter that a shader's author offers: wetness=0.5, tonemap.tint=1,0.9,0.8, is_lit=false, mode=smooth
+    #[arg(long, value_name = "[SHADER.]NAME=VALUE", requires = "headless")]
+    pub(crate) param: Vec<kiln_preview::Assignment>,
     /// Print JSON instead of text
     #[arg(long, requires = "headless")]
     pub(crate) json: bool,

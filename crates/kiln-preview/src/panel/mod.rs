@@ -9,6 +9,7 @@ use crate::theme;
 use crate::view::{Selection, View};
 
 mod diagnostics;
+mod parameters;
 mod side;
 mod timeline;
 mod top;

@@ -22,6 +22,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState) {
             state.selection.env = Some(env);
         }
         show_light(ui, &mut state.view);
+        super::parameters::show(ui, &state.report.parameters, &mut state.view.parameters);
         section(ui, "Camera");
         show_camera(ui, &mut state.view);
         show_notes(ui, state);
@@ -30,7 +31,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState) {
     });
 }
 
-fn section(ui: &mut Ui, title: &str) {
+pub(super) fn section(ui: &mut Ui, title: &str) {
     ui.add_space(10.0);
     ui.label(RichText::new(title).strong().color(theme::WEAK));
 }
@@ -64,7 +65,12 @@ fn show_light(ui: &mut Ui, view: &mut View) {
         row(ui, "Blur", Slider::new(&mut view.background_blur, 0.0..=1.0).max_decimals(2));
     });
     view.environment_rotation_rad = degrees.to_radians();
-    let neutral = View { camera: view.camera, time_s: view.time_s, ..View::default() };
+    let neutral = View {
+        camera: view.camera,
+        time_s: view.time_s,
+        parameters: view.parameters.clone(),
+        ..View::default()
+    };
     if ui.add_enabled(*view != neutral, egui::Button::new("Reset light")).clicked() {
         *view = neutral;
     }

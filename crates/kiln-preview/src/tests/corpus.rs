@@ -75,12 +75,7 @@ fn add_model(build: &mut Build, name: &str, path: &Path) {
     let packed =
         kiln_scene::pack(name, &bytes, &mut |uri| std::fs::read(folder.join(uri)).ok().map(Arc::from));
     let glb = packed.glb.unwrap_or_else(|| panic!("{name}: {:?}", packed.diagnostics));
-    let scene = kiln_scene::load(&glb).expect("what was packed loads");
-    for material in &scene.materials {
-        let features: Vec<&str> = material.effects.iter().map(|effect| effect.name()).collect();
-        build.shaders(&[&features]);
-    }
-    build.scene(name, "sky", glb.to_vec());
+    build.shaders_of(&glb).scene(name, "sky", glb.to_vec());
 }
 
 fn find(corpus: &Path, name: &str) -> Option<PathBuf> {

@@ -151,6 +151,16 @@ impl Build {
         self.target(&format!("scene/{name}"), "scene", meta, &[("glb", glb)])
     }
 
+    /// The shader variants that a scene's materials call for.
+    pub fn shaders_of(&mut self, glb: &[u8]) -> &mut Self {
+        let scene = kiln_scene::load(glb).expect("what was packed loads");
+        for material in &scene.materials {
+            let features: Vec<&str> = material.effects.iter().map(|effect| effect.name()).collect();
+            self.shaders(&[&features]);
+        }
+        self
+    }
+
     pub fn revision(&self) -> Revision {
         Revision::new(self.table.clone(), self.blobs.clone()).expect("every part has its blob")
     }
@@ -158,43 +168,84 @@ impl Build {
 
 /// A unit sphere at the origin with one material, as a GLB that went through `kiln_scene::pack`.
 pub fn sphere_glb(material: Value) -> Vec<u8> {
-    const RINGS: u32 = 96;
-    const SEGMENTS: u32 = 192;
-    let mut positions: Vec<f32> = Vec::new();
-    for ring in 0..=RINGS {
-        let theta = std::f32::consts::PI * ring as f32 / RINGS as f32;
-        for segment in 0..=SEGMENTS {
-            let phi = std::f32::consts::TAU * segment as f32 / SEGMENTS as f32;
-            positions.extend([theta.sin() * phi.sin(), theta.cos(), theta.sin() * phi.cos()]);
+    Sphere { material, ..Sphere::default() }.glb()
+}
+
+/// A unit sphere at the origin, its tangents eastwards, without texture coordinates.
+#[derive(Default)]
+pub struct Sphere {
+    pub material: Value,
+    /// Texture 0, 1 … of one texel each.
+    pub texels: Vec<[u8; 4]>,
+    /// Of its node; none is 1.
+    pub scale: Option<[f32; 3]>,
+}
+
+impl Sphere {
+    /// As a GLB that went through `kiln_scene::pack`.
+    pub fn glb(&self) -> Vec<u8> {
+        const RINGS: u32 = 96;
+        const SEGMENTS: u32 = 192;
+        let (mut positions, mut tangents): (Vec<f32>, Vec<f32>) = (Vec::new(), Vec::new());
+        for ring in 0..=RINGS {
+            let theta = std::f32::consts::PI * ring as f32 / RINGS as f32;
+            for segment in 0..=SEGMENTS {
+                let phi = std::f32::consts::TAU * segment as f32 / SEGMENTS as f32;
+                positions.extend([theta.sin() * phi.sin(), theta.cos(), theta.sin() * phi.cos()]);
+                tangents.extend([phi.cos(), 0.0, -phi.sin(), 1.0]);
+            }
         }
-    }
-    let mut indices: Vec<u32> = Vec::new();
-    for ring in 0..RINGS {
-        for segment in 0..SEGMENTS {
-            let a = ring * (SEGMENTS + 1) + segment;
-            let b = a + SEGMENTS + 1;
-            indices.extend([a, b, a + 1, a + 1, b, b + 1]);
+        let mut indices: Vec<u32> = Vec::new();
+        for ring in 0..RINGS {
+            for segment in 0..SEGMENTS {
+                let a = ring * (SEGMENTS + 1) + segment;
+                let b = a + SEGMENTS + 1;
+                indices.extend([a, b, a + 1, a + 1, b, b + 1]);
+            }
         }
+        let images: Vec<Vec<u8>> = self.texels.iter().map(|texel| png(*texel)).collect();
+        let columns = [
+            bytemuck::cast_slice(&positions).to_vec(),
+            bytemuck::cast_slice(&indices).to_vec(),
+            bytemuck::cast_slice(&tangents).to_vec(),
+        ];
+        let (mut binary, mut views) = (Vec::new(), Vec::new());
+        for bytes in columns.iter().chain(&images) {
+            views.push(json!({ "buffer": 0, "byteOffset": binary.len(), "byteLength": bytes.len() }));
+            binary.extend_from_slice(bytes);
+            binary.resize(binary.len().next_multiple_of(4), 0);
+        }
+        let count = positions.len() / 3;
+        let texture = |at| json!({ "source": at });
+        let image = |at| json!({ "bufferView": columns.len() + at, "mimeType": "image/png" });
+        let document = json!({
+            "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }],
+            "nodes": [{ "mesh": 0, "scale": self.scale.unwrap_or([1.0; 3]) }],
+            "meshes": [{ "primitives": [{
+                "attributes": { "POSITION": 0, "NORMAL": 0, "TANGENT": 2 }, "indices": 1, "material": 0
+            }] }],
+            "materials": [self.material],
+            "textures": (0..images.len()).map(texture).collect::<Vec<_>>(),
+            "images": (0..images.len()).map(image).collect::<Vec<_>>(),
+            "buffers": [{ "byteLength": binary.len() }],
+            "bufferViews": views,
+            "accessors": [
+                { "bufferView": 0, "componentType": 5126, "count": count, "type": "VEC3",
+                  "min": [-1.0, -1.0, -1.0], "max": [1.0, 1.0, 1.0] },
+                { "bufferView": 1, "componentType": 5125, "count": indices.len(), "type": "SCALAR" },
+                { "bufferView": 2, "componentType": 5126, "count": count, "type": "VEC4" },
+            ],
+        });
+        let packed = kiln_scene::pack("sphere.glb", &glb(&document, &binary), &mut |_| None);
+        packed.glb.unwrap_or_else(|| panic!("{:?}", packed.diagnostics)).to_vec()
     }
-    let (vertex_count, vertex_bytes) = (positions.len() / 3, positions.len() * 4);
-    let document = json!({
-        "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
-        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0, "NORMAL": 0 }, "indices": 1, "material": 0 }] }],
-        "materials": [material],
-        "buffers": [{ "byteLength": vertex_bytes + indices.len() * 4 }],
-        "bufferViews": [
-            { "buffer": 0, "byteLength": vertex_bytes },
-            { "buffer": 0, "byteOffset": vertex_bytes, "byteLength": indices.len() * 4 },
-        ],
-        "accessors": [
-            { "bufferView": 0, "componentType": 5126, "count": vertex_count, "type": "VEC3",
-              "min": [-1.0, -1.0, -1.0], "max": [1.0, 1.0, 1.0] },
-            { "bufferView": 1, "componentType": 5125, "count": indices.len(), "type": "SCALAR" },
-        ],
-    });
-    let binary = [bytemuck::cast_slice(&positions), bytemuck::cast_slice(&indices)].concat();
-    let packed = kiln_scene::pack("sphere.glb", &glb(&document, &binary), &mut |_| None);
-    packed.glb.unwrap_or_else(|| panic!("{:?}", packed.diagnostics)).to_vec()
+}
+
+fn png(texel: [u8; 4]) -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let image = image::RgbaImage::from_pixel(1, 1, image::Rgba(texel));
+    image.write_to(&mut bytes, image::ImageFormat::Png).expect("one texel can be encoded");
+    bytes.into_inner()
 }
 
 /// glTF 2.0, section 4: header, JSON chunk, binary chunk.

@@ -10,11 +10,11 @@ use super::fixture::{Build, SIX_COLORS, gpu};
 use crate::{HeadlessViewer, OrbitCamera};
 
 /// Straight from the front, far enough for a sphere of radius 1 to fill half the height.
-const FRONT: OrbitCamera =
+pub(super) const FRONT: OrbitCamera =
     OrbitCamera { target: Vec3::ZERO, distance: 4.0, yaw_rad: 0.0, pitch_rad: 0.0, field_of_view_rad: 0.9 };
 
 /// Two steps of 255: rounding of f16 maps, of the f16 picture, and of the output.
-const STEPS_MAX: u8 = 2;
+pub(super) const STEPS_MAX: u8 = 2;
 
 fn furnace_material(metallic: f32, base_color: f32) -> serde_json::Value {
     json!({ "pbrMetallicRoughness": {
@@ -59,7 +59,7 @@ fn white_furnace_check_sees_a_metal_that_absorbs() {
 }
 
 /// Names the face of [`SIX_COLORS`] that a pixel shows.
-fn face_at(picture: &RgbaImage, x: u32, y: u32) -> &'static str {
+pub(super) fn face_at(picture: &RgbaImage, x: u32, y: u32) -> &'static str {
     const NAMES: [&str; 6] = ["+X", "-X", "+Y", "-Y", "+Z", "-Z"];
     let pixel = picture.get_pixel(x, y);
     let lit = [0, 1, 2].map(|channel| pixel[channel] > 100);
@@ -179,35 +179,4 @@ fn colours_of_an_unlit_material_reach_the_picture_unlit() {
     assert_eq!(*viewer.render().expect("the device reads back").get_pixel(32, 32), in_six_colors);
     let Rgb([red, green, blue]) = Rgb([in_six_colors[0], in_six_colors[1], in_six_colors[2]]);
     assert!(red > green && green > blue && blue > 20, "{in_six_colors:?}");
-}
-
-/// A tonemap whose picture is its parameters.
-const PARAMETERS: &str = "
-struct Params {
-    level: f32,  // @slider(0, 1, 0.25)
-    steps: u32,  // @slider(0, 4, 2)
-    tint: vec4f, // @color(0.5, 1.0, 0.0)
-}
-@group(3) @binding(0) var<uniform> params: Params;
-override gain: f32 = 1.0; // @slider(0, 2)
-@vertex fn vs_main(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
-    return vec4f(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0, 0.0, 1.0);
-}
-@fragment fn fs_main() -> @location(0) vec4f {
-    return vec4f(params.level * gain, f32(params.steps) * 0.25 * params.tint.x, params.tint.w, 1.0);
-}";
-
-#[test]
-fn parameters_of_the_author_start_at_their_defaults() {
-    let Some(gpu) = gpu() else { return };
-    let mut viewer = HeadlessViewer::new(gpu, [8, 8]);
-    let mut build = Build::new();
-    build.shaders(&[&[]]).env("sky", [[0.25; 3]; 6]).shader_text("tonemap", "tonemap", PARAMETERS);
-    let report = viewer.apply(&build.revision());
-    assert_eq!(report.diagnostics, vec![]);
-    assert_eq!(viewer.render().expect("the device reads back").get_pixel(4, 4).0, [64, 64, 255, 255]);
-    // The picture follows the annotation, not only the type.
-    build.shader_text("tonemap", "tonemap", &PARAMETERS.replace("0.25)", "0.75)"));
-    viewer.apply(&build.revision());
-    assert_eq!(viewer.render().expect("the device reads back").get_pixel(4, 4).0, [191, 64, 255, 255]);
 }

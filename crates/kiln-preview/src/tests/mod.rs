@@ -1,9 +1,11 @@
 //! What the preview promises, on whatever adapter there is (lavapipe in CI).
 
 mod corpus;
+mod effects;
 mod faults;
 mod fixture;
 mod frames;
 mod panels;
+mod parameters;
 mod pure;
 mod wire;

@@ -4,10 +4,11 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use kiln_diagnostic::Diagnostic;
 use kiln_link::{ActionTime, RevisionTable, Work};
+use kiln_shader::Widget;
 
 use crate::panel::{self, Connection, PanelState};
 use crate::theme;
-use crate::{Selection, View};
+use crate::{OfferedParameter, Selection, View};
 
 fn state() -> PanelState {
     let mut state = PanelState::new("llvmpipe, Vulkan".to_owned(), Selection::default(), View::default());
@@ -107,4 +108,66 @@ fn choosing_another_scene_drops_the_camera_of_the_first() {
     harness.run_steps(4);
     assert_eq!(harness.state().selection, Selection { scene: Some("car".to_owned()), env: None });
     assert_eq!(harness.state().view.camera, None);
+}
+
+fn offered(name: &str, ty: &str, widget: Widget, first: Vec<f64>) -> OfferedParameter {
+    let (shader, name, ty, label) =
+        ("pbr".to_owned(), name.to_owned(), ty.to_owned(), "how it looks".to_owned());
+    OfferedParameter { shader, name, ty, is_override: false, widget, first, label }
+}
+
+fn state_with_parameters() -> PanelState {
+    let mut state = state();
+    let names = vec!["flat".to_owned(), "smooth".to_owned()];
+    state.report.parameters = vec![
+        offered("wetness", "f32", Widget::Slider { least: 0.0, greatest: 2.0 }, vec![0.5]),
+        offered("tint", "vec3<f32>", Widget::Color, vec![1.0, 0.9, 0.8]),
+        offered("is_lit", "u32", Widget::Toggle, vec![1.0]),
+        offered("mode", "u32", Widget::Choice { names }, vec![0.0]),
+    ];
+    state
+}
+
+/// What the parameters of the state are set to.
+fn values(state: &PanelState) -> Vec<Vec<f64>> {
+    state.report.parameters.iter().map(|parameter| state.view.parameters.of(parameter)).collect()
+}
+
+#[test]
+fn parameters_have_a_row_each_and_change_what_is_shown() {
+    let mut harness = harness(state_with_parameters());
+    assert!(harness.query_by_label("Shader pbr").is_some());
+    let first = values(harness.state());
+    harness.get_by_role_and_label(egui::accesskit::Role::CheckBox, "is_lit").click();
+    harness.run_steps(4);
+    harness.get_by_role_and_label(egui::accesskit::Role::ComboBox, "mode").click();
+    harness.run_steps(4);
+    harness.get_by_label("smooth").click();
+    harness.run_steps(4);
+    let slider = harness.get_by_role_and_label(egui::accesskit::Role::Slider, "wetness");
+    slider.click();
+    harness.run_steps(4);
+    let changed = values(harness.state());
+    assert!(changed[0] != first[0] && (0.0..=2.0).contains(&changed[0][0]), "{changed:?}");
+    assert_eq!(changed[1..], [vec![1.0, 0.9, 0.8], vec![0.0], vec![1.0]]);
+    harness.get_by_label("reset pbr.mode").click();
+    harness.run_steps(4);
+    assert_eq!(values(harness.state())[3], [0.0]);
+    assert_eq!(values(harness.state())[2], [0.0], "the others stay");
+    harness.get_by_label("Reset pbr").click();
+    harness.run_steps(4);
+    assert_eq!(values(harness.state()), first);
+}
+
+#[test]
+fn resetting_the_light_leaves_parameters_alone() {
+    let mut state = state_with_parameters();
+    let wetness = state.report.parameters[0].clone();
+    state.view.parameters.set(&wetness, vec![1.5]);
+    state.view.exposure_ev = 2.0;
+    let mut harness = harness(state);
+    harness.get_by_label("Reset light").click();
+    harness.run_steps(4);
+    assert_eq!(harness.state().view.exposure_ev, 0.0);
+    assert_eq!(harness.state().view.parameters.of(&wetness), [1.5]);
 }

@@ -18,6 +18,7 @@ fn options(folder: &std::path::Path) -> HeadlessOptions {
         out: folder.join("frames"),
         frames: 2,
         size: [64, 36],
+        parameters: Vec::new(),
         selection: Selection::default(),
         view: View::default(),
         rotation_step_rad: 1.0,

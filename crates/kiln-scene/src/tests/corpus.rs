@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::{Packed, Scene, external_uris, load, pack, variant_name};
+use crate::{Effect, Packed, Scene, external_uris, load, pack, variant_name};
 
 /// The corpus folder; says loudly that a test was skipped where it is not set.
 fn corpus() -> Option<PathBuf> {
@@ -187,6 +187,34 @@ fn sheen_cloth_is_one_draw() {
         variants: &["normal_map+occlusion+sheen"],
         bounds: [[-0.027_363, 0.000_1, -0.048_482], [0.044_766, 0.040_402, 0.022_842]],
     });
+}
+
+/// Union of the effects of a file's materials.
+#[track_caller]
+fn check_effects(file: &str, wanted: &[Effect], absent: &[Effect]) {
+    let Some(corpus) = corpus() else { return };
+    let packed = pack_file(&corpus, &format!("gltf/{file}"));
+    let found = packed.all_effects();
+    assert!(wanted.iter().all(|effect| found.contains(effect)), "{file}: {found:?}");
+    assert!(!absent.iter().any(|effect| found.contains(effect)), "{file}: {found:?}");
+}
+
+#[test]
+fn test_scenes_of_the_newer_extensions_call_for_them() {
+    use Effect::{Anisotropy, Dispersion, Iridescence, Transmission, Volume};
+    let khronos = "khronos-sample-assets";
+    check_effects(
+        &format!("{khronos}/AttenuationTest/glTF/AttenuationTest.gltf"),
+        &[Transmission, Volume],
+        &[Dispersion],
+    );
+    check_effects(
+        &format!("{khronos}/AnisotropyStrengthTest/glTF/AnisotropyStrengthTest.gltf"),
+        &[Anisotropy],
+        &[Iridescence],
+    );
+    check_effects("adobe-usd-tests/ExtIridescence.gltf", &[Iridescence], &[Anisotropy]);
+    check_effects("adobe-usd-tests/ExtDispersion.gltf", &[Dispersion, Volume], &[Anisotropy]);
 }
 
 #[test]

@@ -95,6 +95,138 @@ fn transmission_is_an_effect_with_a_note() {
     assert!(packed.diagnostics.iter().any(|it| it.message.contains("transmission is approximated")));
 }
 
+/// A dielectric with these extensions of `KHR_materials_…`.
+fn dielectric(extensions: Value) -> Value {
+    let named = extensions.as_object().unwrap().iter();
+    let named: serde_json::Map<String, Value> =
+        named.map(|(name, values)| (format!("KHR_materials_{name}"), values.clone())).collect();
+    json!({ "pbrMetallicRoughness": {"metallicFactor": 0.0}, "extensions": named })
+}
+
+#[test]
+fn anisotropy_needs_strength_and_a_texture_with_blue() {
+    let brush = |strength: f64| dielectric(json!({"anisotropy": {"anisotropyStrength": strength}}));
+    assert_eq!(variant(brush(0.0), &[]), "base");
+    assert_eq!(variant(brush(-1.0), &[]), "base");
+    assert_eq!(variant(brush(0.5), &[]), "anisotropy");
+    let textured =
+        || dielectric(json!({"anisotropy": {"anisotropyStrength": 1, "anisotropyTexture": {"index": 0}}}));
+    assert_eq!(variant(textured(), &[[255, 128, 0, 255]]), "base");
+    assert_eq!(variant(textured(), &[[255, 128, 9, 255]]), "anisotropy");
+}
+
+#[test]
+fn brush_gets_tangents_along_the_first_coordinates_where_the_mesh_has_none() {
+    let material = dielectric(json!({"anisotropy": {"anisotropyStrength": 0.5, "anisotropyRotation": 0.25}}));
+    let scene = scene_of(&File::with_material(material).bytes());
+    assert_eq!(scene.materials[0].anisotropy_rotation, 0.25);
+    for vertex in &scene.primitives[0].vertices {
+        super::check_within("tangent", &vertex.tangent[..3], &[1.0, 0.0, 0.0], 1e-6);
+        assert_eq!(vertex.uv0, [0.0; 2], "nothing else reads them");
+    }
+}
+
+#[test]
+fn brush_on_a_mesh_with_tangents_asks_for_no_coordinates() {
+    let mut file = File::with_material(dielectric(json!({"anisotropy": {"anisotropyStrength": 0.5}})));
+    let tangents = file.floats(&[[0.0, 1.0, 0.0, 1.0]; 3]);
+    file.primitive()["attributes"]["TANGENT"] = json!(tangents);
+    file.primitive()["attributes"].as_object_mut().unwrap().remove("TEXCOORD_0");
+    let scene = scene_of(&file.bytes());
+    assert_eq!(scene.notes, Vec::<String>::new());
+    assert_eq!(scene.primitives[0].vertices[0].tangent, [0.0, 1.0, 0.0, 1.0]);
+}
+
+#[test]
+fn iridescence_needs_a_factor_a_texture_with_red_and_a_film_that_is_not_nothing() {
+    let film = |values: Value| dielectric(json!({ "iridescence": values }));
+    assert_eq!(variant(film(json!({"iridescenceFactor": 0})), &[]), "base");
+    assert_eq!(variant(film(json!({"iridescenceFactor": 1})), &[]), "iridescence");
+    let thin = |max: f64| json!({"iridescenceFactor": 1, "iridescenceThicknessMaximum": max});
+    assert_eq!(variant(film(thin(0.0)), &[]), "base", "without a texture the maximum counts alone");
+    let textured = || film(json!({"iridescenceFactor": 1, "iridescenceTexture": {"index": 0}}));
+    assert_eq!(variant(textured(), &[[0, 255, 255, 255]]), "base");
+    assert_eq!(variant(textured(), &[[1, 0, 0, 255]]), "iridescence");
+    let minimum = || {
+        film(json!({"iridescenceFactor": 1, "iridescenceThicknessMaximum": 0,
+            "iridescenceThicknessTexture": {"index": 0}}))
+    };
+    assert_eq!(variant(minimum(), &[[0, 255, 0, 255]]), "base");
+    assert_eq!(variant(minimum(), &[[0, 254, 0, 255]]), "iridescence");
+}
+
+#[test]
+fn volume_needs_thickness_and_light_that_enters() {
+    let inside = |thickness: f64, transmission: f64| {
+        dielectric(
+            json!({"volume": {"thicknessFactor": thickness}, "transmission": {"transmissionFactor": transmission}}),
+        )
+    };
+    assert_eq!(variant(inside(0.0, 1.0), &[]), "transmission");
+    assert_eq!(variant(inside(0.5, 0.0), &[]), "base", "nobody sees the inside of what is opaque");
+    assert_eq!(variant(inside(0.5, 1.0), &[]), "transmission+volume");
+    let textured = || {
+        dielectric(json!({"transmission": {"transmissionFactor": 1},
+            "volume": {"thicknessFactor": 1, "thicknessTexture": {"index": 0}}}))
+    };
+    assert_eq!(variant(textured(), &[[255, 0, 255, 255]]), "transmission");
+    assert_eq!(variant(textured(), &[[0, 1, 0, 255]]), "transmission+volume");
+    let mut metal = inside(0.5, 1.0);
+    metal["pbrMetallicRoughness"] = json!({});
+    assert_eq!(variant(metal, &[]), "base");
+}
+
+#[test]
+fn dispersion_needs_a_volume_that_transmits_and_refracts() {
+    let prism = |dispersion: f64, thickness: f64, ior: f64| {
+        dielectric(json!({"dispersion": {"dispersion": dispersion}, "volume": {"thicknessFactor": thickness},
+            "ior": {"ior": ior}, "transmission": {"transmissionFactor": 1}}))
+    };
+    assert_eq!(variant(prism(0.0, 1.0, 1.5), &[]), "transmission+volume");
+    assert_eq!(variant(prism(2.0, 0.0, 1.5), &[]), "transmission");
+    assert_eq!(variant(prism(2.0, 1.0, 1.0), &[]), "specular+transmission+volume");
+    assert_eq!(variant(prism(2.0, 1.0, 1.5), &[]), "dispersion+transmission+volume");
+}
+
+#[test]
+fn diffuse_transmission_needs_a_factor_and_a_texture_with_alpha() {
+    let leaf = |factor: f64| {
+        dielectric(
+            json!({"diffuse_transmission": {"diffuseTransmissionFactor": factor}, "volume": {"thicknessFactor": 1}}),
+        )
+    };
+    assert_eq!(variant(leaf(0.0), &[]), "base");
+    assert_eq!(variant(leaf(0.5), &[]), "diffuse_transmission+volume");
+    let textured = || {
+        dielectric(json!({"diffuse_transmission":
+            {"diffuseTransmissionFactor": 1, "diffuseTransmissionTexture": {"index": 0}}}))
+    };
+    assert_eq!(variant(textured(), &[[255, 255, 255, 0]]), "base");
+    assert_eq!(variant(textured(), &[[0, 0, 0, 1]]), "diffuse_transmission");
+}
+
+#[test]
+fn values_of_the_transmitting_effects_and_their_absence_reach_the_material() {
+    let values = json!({
+        "transmission": {"transmissionFactor": 1},
+        "volume": {"thicknessFactor": 0.5, "attenuationDistance": 2.5, "attenuationColor": [0.5, 0.25, 1.0]},
+        "dispersion": {"dispersion": 3},
+        "diffuse_transmission": {"diffuseTransmissionFactor": 0.75, "diffuseTransmissionColorFactor": [1, 0.5, 0.25]},
+        "iridescence": {"iridescenceFactor": 0.5, "iridescenceIor": 1.75, "iridescenceThicknessMinimum": 200,
+            "iridescenceThicknessMaximum": 700}
+    });
+    let materials = scene_of(&File::with_material(dielectric(values)).bytes()).materials;
+    let it = &materials[0];
+    assert_eq!((it.thickness_factor, it.attenuation_distance), (0.5, 2.5));
+    assert_eq!((it.attenuation_color, it.dispersion), ([0.5, 0.25, 1.0], 3.0));
+    assert_eq!(it.diffuse_transmission_factor, 0.75);
+    assert_eq!(it.diffuse_transmission_color_factor, [1.0, 0.5, 0.25]);
+    assert_eq!((it.iridescence_factor, it.iridescence_ior), (0.5, 1.75));
+    assert_eq!((it.iridescence_thickness_minimum, it.iridescence_thickness_maximum), (200.0, 700.0));
+    let it = &scene_of(&File::with_material(dielectric(json!({}))).bytes()).materials[0];
+    assert_eq!((it.thickness_factor, it.attenuation_distance), (0.0, f32::INFINITY));
+}
+
 #[test]
 fn unlit_ends_every_other_effect() {
     let material = json!({"emissiveFactor": [1, 1, 1], "extensions":

@@ -7,7 +7,9 @@ use anyhow::Context as _;
 use kiln_gpu::Gpu;
 use kiln_link::{Client, ClientEvent, FrameReport};
 use kiln_preview::HeadlessViewer;
-use kiln_preview::{HeadlessOptions, Selection, View, WindowOptions, run_headless, run_window};
+use kiln_preview::{
+    HeadlessOptions, RefusedParameter, Selection, View, WindowOptions, run_headless, run_window,
+};
 
 use crate::args::PreviewArgs;
 use crate::out::say;
@@ -58,9 +60,14 @@ fn headless(
         size: args.size,
         selection,
         view,
+        parameters: args.param.clone(),
         rotation_step_rad: args.turn.to_radians(),
         revision_min: args.wait_revision,
         timeout: Duration::from_secs(args.timeout_s),
+    });
+    let done = done.map_err(|error| match error.downcast::<RefusedParameter>() {
+        Ok(refused) => place::WrongInput(refused.to_string()).into(),
+        Err(other) => other,
     })?;
     if args.json {
         say!("{}", serde_json::to_string_pretty(&done)?);
