@@ -7,6 +7,7 @@ use crate::{Compiled, Outcome, Program, compile};
 
 mod canonical;
 mod cases;
+mod compiler;
 mod conditions;
 mod diagnostics;
 mod emit;

@@ -55,9 +55,7 @@ fn run(text: &str, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fau
         finding.labels.sort_by_key(|(_, label)| label.starts_with("naga::ir::Function"));
         return Ok(Err(vec![finding]));
     }
-    canonical::strip_unused(&mut module);
-    let info =
-        front::validate(&module).map_err(|error| Fault::Internal(format!("after compaction: {error:?}")))?;
+    let info = front::strip(&mut module)?;
     let warnings = if lints { lint::check(&module, &info) } else { Vec::new() };
     canonical::emit(&module, &info).map(|wgsl| Ok((wgsl, warnings))).map_err(Fault::Internal)
 }
@@ -175,9 +173,6 @@ fn stored(module: &Module, error: &ValidationError) -> Option<(String, Option<Ra
 
 /// naga's types in GLSL's words.
 fn in_glsl(message: &str) -> String {
-    if let Some(operation) = message.strip_prefix("operation ").and_then(|rest| rest.split(' ').next()) {
-        return format!("these types do not go together in `{}`", operator(operation));
-    }
     if message.starts_with("unable to operate on image class") {
         return "textures of integers cannot be filtered".to_owned();
     }
@@ -185,6 +180,7 @@ fn in_glsl(message: &str) -> String {
     for (scalar, prefix) in [("f32", ""), ("i32", "i"), ("u32", "u"), ("bool", "b")] {
         for len in 2..=4 {
             text = text.replace(&format!("vec{len}<{scalar}>"), &format!("{prefix}vec{len}"));
+            text = text.replace(&format!("mat{len}x{len}<{scalar}>"), &format!("mat{len}"));
             for rows in 2..=4 {
                 text = text.replace(&format!("mat{len}x{rows}<{scalar}>"), &format!("mat{len}x{rows}"));
             }
@@ -193,36 +189,11 @@ fn in_glsl(message: &str) -> String {
     text.replace("`f32`", "`float`").replace("`i32`", "`int`").replace("`u32`", "`uint`")
 }
 
-/// The sign of naga's operator.
-fn operator(name: &str) -> &str {
-    match name {
-        "Add" => "+",
-        "Subtract" => "-",
-        "Multiply" => "*",
-        "Divide" => "/",
-        "Modulo" => "%",
-        "Equal" => "==",
-        "NotEqual" => "!=",
-        "Less" => "<",
-        "LessEqual" => "<=",
-        "Greater" => ">",
-        "GreaterEqual" => ">=",
-        "And" => "&",
-        "ExclusiveOr" => "^",
-        "InclusiveOr" => "|",
-        "LogicalAnd" => "&&",
-        "LogicalOr" => "||",
-        "ShiftLeft" => "<<",
-        "ShiftRight" => ">>",
-        other => other,
-    }
-}
-
 /// An operator between types that it does not take, which naga notices late: at what stands after it.
 fn incompatible(text: &str, error: &Error) -> Option<Finding> {
     let message = error.kind.to_string();
     let (_, operation) = message.split_once("IncompatibleOperands(")?;
-    let sign = operator(operation.trim_start_matches(['"', '\\']).split('(').next()?);
+    let sign = describe::sign(operation.trim_start_matches(['"', '\\']).split('(').next()?);
     let end = error.meta.to_range()?.end;
     let labels =
         text.get(..end)?.rfind(&format!(" {sign} ")).map(|at| (at + 1..at + 1 + sign.len(), String::new()));
