@@ -15,6 +15,7 @@ mod faults;
 mod golden;
 mod harness;
 mod live;
+mod shader_commands;
 mod shaders;
 mod tidy;
 #[cfg(feature = "preview")]

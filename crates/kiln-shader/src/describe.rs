@@ -151,13 +151,14 @@ impl Types<'_> {
 
 /// What naga's front end says while it works out constants, as `LogicalAnd(u32, _)`: the types that it knows.
 pub fn parse_error(message: &str) -> String {
+    let message = clean(message);
     let operands = || {
-        let (operator, types) =
-            message.strip_prefix("incompatible operands: ")?.strip_suffix(')')?.split_once('(')?;
+        let operation = message.strip_prefix("incompatible operands: ")?.strip_suffix(')')?;
+        let (operator, types) = operation.split_once('(')?;
         let known = types.split(", ").filter(|ty| *ty != "_").map(|ty| format!("`{ty}`"));
         Some(format!("`{}` does not take {}", sign(operator), known.collect::<Vec<_>>().join(" and ")))
     };
-    operands().unwrap_or_else(|| clean(message))
+    operands().unwrap_or(message)
 }
 
 /// The sign of an operator that naga calls `name`.

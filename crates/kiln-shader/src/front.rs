@@ -69,11 +69,17 @@ fn check_length(text: &str) -> Result<(), Fault> {
 }
 
 /// Compiles stages that were joined: each is canonical by itself, which leaves the order of their declarations open.
-pub fn compile_joined(text: &str) -> Result<Compiled, Fault> {
+/// `name_locals` may name arguments and variables, which changes no text.
+pub fn compile_joined(
+    text: &str,
+    name_locals: impl FnOnce(&mut Module) + Send,
+) -> Result<(Compiled, Vec<LinkedFunction>), Fault> {
     on_deep_stack(Fault::Internal, || {
         let mut module = naga::front::wgsl::parse_str(text).map_err(|error| reparse_fault(&error, text))?;
         validate(&module).map_err(|error| Fault::Source(validation_finding(&module, &error)))?;
-        canonical(&mut module).map(|canonical| canonical.compiled)
+        name_locals(&mut module);
+        let Canonical { compiled, reparsed, .. } = canonical(&mut module)?;
+        Ok((compiled, source_map::functions(&module, &reparsed)))
     })
 }
 

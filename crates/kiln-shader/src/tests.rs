@@ -19,6 +19,7 @@ mod names;
 mod parameters;
 mod ranges;
 mod shaders;
+mod source_maps;
 
 /// A project in memory.
 struct Files(BTreeMap<String, Arc<str>>);

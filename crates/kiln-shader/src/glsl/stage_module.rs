@@ -7,14 +7,26 @@ use naga::front::glsl::{Error, ErrorKind, ExpectedToken, Frontend, Options, Toke
 use naga::valid::{FunctionError, ValidationError};
 use naga::{AddressSpace, Barrier, Block, Expression, Module, Statement, TypeInner};
 
+use super::source_map::{self, StageFunction};
 use super::{inout, lower, stage};
 use crate::explain::Finding;
 use crate::front::{self, Fault};
 use crate::lint::{self, Warning};
 use crate::{Stage, canonical, describe};
 
-/// What naga made of a stage: its WGSL and what is doubtful about it, or what is wrong.
-pub type Made = Result<(String, Vec<Warning>), Vec<Finding>>;
+/// What naga made of a stage, or what is wrong.
+pub type Made = Result<Translated, Vec<Finding>>;
+
+/// A stage in WGSL.
+#[derive(Debug)]
+pub struct Translated {
+    /// Its text.
+    pub wgsl: String,
+    /// What is doubtful about it.
+    pub warnings: Vec<Warning>,
+    /// Its functions.
+    pub functions: Vec<StageFunction>,
+}
 
 /// Variables' names by group and binding.
 pub type Names = BTreeMap<(u32, u32), String>;
@@ -57,7 +69,9 @@ fn run(text: &str, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fau
     }
     let info = front::strip(&mut module)?;
     let warnings = if lints { lint::check(&module, &info) } else { Vec::new() };
-    canonical::emit(&module, &info).map(|wgsl| Ok((wgsl, warnings))).map_err(Fault::Internal)
+    let wgsl = canonical::emit(&module, &info).map_err(Fault::Internal)?;
+    let functions = source_map::functions(&module, &wgsl);
+    Ok(Ok(Translated { wgsl, warnings, functions }))
 }
 
 /// Gives variables the names that Kiln binds by, and the entry point its own.

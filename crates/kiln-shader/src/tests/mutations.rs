@@ -165,6 +165,30 @@ fn equal_programs_give_equal_text_whatever_their_comments() {
     }
 }
 
+/// A word in code is the author's own, a comment nobody's.
+#[test]
+fn features_are_named_by_conditions_and_macros_alone() {
+    let features = |text: &str| -> String {
+        let text = format!("{HEAD}{text}\nvoid main() {{ colour = vec4(1.0); }}");
+        let case = Case::of(&[("a.frag", &text)]);
+        let outcome = case.compile();
+        assert!(outcome.compiled.is_some(), "{}", rendered(&outcome));
+        let scanned = crate::scan(&crate::Program::of("a.frag"), &mut |path| case.files.get(path).cloned());
+        assert_eq!(scanned.features, outcome.features);
+        outcome.features.into_iter().collect::<Vec<_>>().join(" ")
+    };
+    assert_eq!(
+        features("const int FEATURE_COUNT = 3; // FEATURE_NOTE\n/*\n#ifdef FEATURE_OLD\n#endif */"),
+        ""
+    );
+    assert_eq!(features("#define FEATURE_OWN 2"), "");
+    // The twins.
+    let text = "#if FEATURE_A && defined(FEATURE_B)\n#elif FEATURE_C\n#endif\n#ifdef FEATURE_D\n#endif\n#ifndef FEATURE_E\n#endif";
+    assert_eq!(features(text), "a b c d e");
+    assert_eq!(features("#if 0\n#ifdef FEATURE_INNER\n#endif\n#endif"), "inner");
+    assert_eq!(features("#define HAS(x) FEATURE_F\n#if HAS(1)\n#endif"), "f");
+}
+
 /// xorshift64: the same numbers on every run.
 struct Random(u64);
 
