@@ -77,9 +77,6 @@ impl Types<'_> {
                     self.a(*seen_expression)
                 )
             }
-            FunctionError::InvalidStoreTypes { pointer, value } => {
-                format!("this holds {}, the value is {}", self.a(*pointer), self.a(*value))
-            }
             FunctionError::InvalidIfType(condition) => {
                 format!("the condition of `if` must be `bool`, this is {}", self.a(*condition))
             }

@@ -9,6 +9,8 @@ mod canonical;
 mod cases;
 mod compiler;
 mod conditions;
+#[path = "../../kiln-worker/tests/fuzz/damage.rs"]
+mod damage;
 mod diagnostics;
 mod emit;
 mod hostile;
@@ -17,6 +19,8 @@ mod lint;
 mod mutations;
 mod names;
 mod parameters;
+#[path = "../../kiln-worker/tests/fuzz/random.rs"]
+mod random;
 mod ranges;
 mod shaders;
 mod source_maps;

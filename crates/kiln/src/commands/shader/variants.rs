@@ -77,10 +77,10 @@ struct Counts {
 
 impl Counts {
     fn new(variants: &[Variant]) -> Counts {
-        let asked = |variant: &&Variant| variant.names.len();
+        let asked = |variants: &[&Variant]| variants.iter().map(|variant| variant.names.len()).sum::<usize>();
         let (good, bad): (Vec<_>, Vec<_>) =
             variants.iter().partition(|variant| variant.outcome.compiled.is_some());
-        let (sound, broken) = (good.iter().map(asked).sum(), bad.iter().map(asked).sum());
+        let (sound, broken) = (asked(&good), asked(&bad));
         let texts = good.iter().filter_map(|variant| Some(&variant.outcome.compiled.as_ref()?.wgsl));
         let artefacts = texts.collect::<BTreeSet<_>>().len();
         Counts { asked: sound + broken, compiled: good.len(), broken, shared: sound - artefacts, artefacts }
