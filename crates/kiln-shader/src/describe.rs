@@ -80,9 +80,6 @@ impl Types<'_> {
             FunctionError::InvalidIfType(condition) => {
                 format!("the condition of `if` must be `bool`, this is {}", self.a(*condition))
             }
-            FunctionError::InvalidSwitchType(value) => {
-                format!("`switch` takes `i32` or `u32`, this is {}", self.a(*value))
-            }
             _ => return None,
         })
     }

@@ -434,7 +434,6 @@ fn types_that_do_not_go_together_are_named_as_their_author_writes_them() {
         ("let x = -u;", "error: `-` does not take `u32`"),
         ("let x = u && true;", "error: `&&` does not take `u32`"),
         ("if u { }", "error: the condition of `if` must be `bool`, this is `u32`"),
-        ("switch v.x { default { } }", "error: `switch` takes `i32` or `u32`, this is `f32`"),
         ("let x = f(v);", "error: argument 1 of `f` must be `f32`, this value is `vec3<f32>`"),
         ("let x = v + v.x;", ""),
     ];
