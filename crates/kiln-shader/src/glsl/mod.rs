@@ -18,7 +18,7 @@ use kiln_diagnostic::Diagnostic;
 
 use crate::link::Read;
 use crate::lint::{Allowances, Warning};
-use crate::{Compiled, Outcome, Program, Scan, Stage, front, limits, parameter};
+use crate::{Compiled, Outcome, Program, Scan, SourceMap, Stage, front, limits, parameter};
 use declare::Item;
 use lex::Token;
 use source::Sources;
@@ -51,6 +51,7 @@ mod preprocess;
 mod rewrite;
 mod scene;
 mod source;
+mod source_map;
 mod stage;
 mod stage_module;
 mod statement;
@@ -96,8 +97,8 @@ pub fn compile(program: &Program, features: &BTreeSet<String>, lints: bool, read
     let mut sources = Sources::new(read);
     let mut named = BTreeSet::new();
     let stages = load(&mut sources, program, features, &mut named);
-    let mut compiled = if has_errors(&sources) { None } else { translate(&mut sources, &stages, lints) };
-    if let Some(compiled) = &mut compiled {
+    let mut translated = if has_errors(&sources) { None } else { translate(&mut sources, &stages, lints) };
+    if let Some((compiled, _)) = &mut translated {
         let mut annotations = annotations(&mut sources);
         for (variable, value) in initial::values(&stages) {
             parameter::give_first(&mut annotations, &variable.name.text, variable.ty.is("bool"), value);
@@ -112,7 +113,9 @@ pub fn compile(program: &Program, features: &BTreeSet<String>, lints: bool, read
             diagnostics.push(diagnostic);
         }
     }
-    Outcome { compiled, diagnostics, dependencies, features: named, ..Outcome::default() }
+    let (compiled, source_map) = translated.unzip();
+    let source_map = source_map.unwrap_or_default();
+    Outcome { compiled, source_map, diagnostics, dependencies, features: named, is_library: false }
 }
 
 /// Each file's, though it may be included more than once.
@@ -216,7 +219,7 @@ fn stage_of(sources: &mut Sources<'_, '_>, path: &str, pragma: Option<&Token>) -
 }
 
 /// Everything after preprocessing.
-fn translate(sources: &mut Sources<'_, '_>, stages: &[Parsed], lints: bool) -> Option<Compiled> {
+fn translate(sources: &mut Sources<'_, '_>, stages: &[Parsed], lints: bool) -> Option<(Compiled, SourceMap)> {
     check_main(sources, stages);
     bindings::check_equal(sources, stages);
     let interfaces = locations::assign(sources, stages);
@@ -231,7 +234,7 @@ fn translate(sources: &mut Sources<'_, '_>, stages: &[Parsed], lints: bool) -> O
         return None;
     }
     let names: BTreeMap<(u32, u32), String> = bound.of.iter().map(|(name, at)| (*at, name.clone())).collect();
-    let mut written = Vec::new();
+    let (mut written, mut functions) = (Vec::new(), Vec::new());
     let mut diagnostics = Vec::new();
     let files = sources.files.iter().map(|file| (file.path.as_str(), &*file.text));
     let allowances = if lints { Allowances::read(files, &mut diagnostics) } else { Allowances::default() };
@@ -239,12 +242,13 @@ fn translate(sources: &mut Sources<'_, '_>, stages: &[Parsed], lints: bool) -> O
     for (stage, lowered) in stages.iter().zip(&texts) {
         let text = &lowered.text;
         let found: Vec<Diagnostic> = match stage_module::translate(lowered, stage.stage, &names, lints) {
-            Ok(Ok((wgsl, warnings))) => {
-                written.push((wgsl, stage::ending(stage.stage)));
+            Ok(Ok(translated)) => {
+                written.push((translated.wgsl, stage::ending(stage.stage)));
+                functions.push(translated.functions);
                 let warn = |Warning { rule, finding, help }| {
                     allowances.warn(explain::of_stage(sources, stage, text, finding), rule, &help)
                 };
-                warnings.into_iter().take(limits::WARNINGS_MAX).filter_map(warn).collect()
+                translated.warnings.into_iter().take(limits::WARNINGS_MAX).filter_map(warn).collect()
             }
             Ok(Err(findings)) => {
                 findings.into_iter().map(|finding| explain::of_stage(sources, stage, text, finding)).collect()
@@ -257,20 +261,32 @@ fn translate(sources: &mut Sources<'_, '_>, stages: &[Parsed], lints: bool) -> O
         return None;
     }
     let merged = holders.values().map(String::as_str).collect();
-    link(sources, stages, &interfaces, &written, &bound, &merged)
+    let (joined, origins) = join(sources, stages, &written, &merged)?;
+    let name_locals = |module: &mut naga::Module| source_map::name_locals(module, &origins, &functions);
+    match front::compile_joined(&joined, name_locals) {
+        Ok((mut compiled, canonical)) => {
+            restore_names(&mut compiled, stages, &interfaces);
+            let map = source_map::place(sources, stages, &texts, (&origins, &functions), canonical);
+            Some((compiled, map))
+        }
+        Err(fault) => {
+            let root = stages.first()?.root;
+            let diagnostic = explain::of_program(sources, &bound, &joined, root, fault);
+            sources.diagnostics.push(diagnostic);
+            None
+        }
+    }
 }
 
-fn link(
+/// Joins the stages; what keeps them apart is left in `sources`.
+fn join(
     sources: &mut Sources<'_, '_>,
     stages: &[Parsed],
-    interfaces: &[locations::Interface],
     written: &[(String, &str)],
-    bound: &bindings::Bindings,
     holders: &BTreeSet<&str>,
-) -> Option<Compiled> {
-    let root = stages.first()?.root;
-    let joined = match join::join(written, holders) {
-        Ok(joined) => joined,
+) -> Option<(String, source_map::Origins)> {
+    match join::join(written, holders) {
+        Ok(joined) => Some(joined),
         Err(join::Clash(name)) => {
             let message = format!("`{name}` differs between the stages");
             let places = bindings::places_of(stages, &name);
@@ -281,21 +297,10 @@ fn link(
                     diagnostic.notes.insert(0, note);
                     diagnostic
                 }
-                _ => Diagnostic::error(message).in_file(&sources.files[root].path),
+                _ => Diagnostic::error(message).in_file(&sources.files[stages.first()?.root].path),
             };
             let help = "declare it alike in all stages, best in one included file";
             sources.diagnostics.push(diagnostic.with_help(help));
-            return None;
-        }
-    };
-    match front::compile_joined(&joined) {
-        Ok(mut compiled) => {
-            restore_names(&mut compiled, stages, interfaces);
-            Some(compiled)
-        }
-        Err(fault) => {
-            let diagnostic = explain::of_program(sources, bound, &joined, root, fault);
-            sources.diagnostics.push(diagnostic);
             None
         }
     }
