@@ -17,6 +17,7 @@ mod harness;
 mod live;
 #[cfg(feature = "preview")]
 mod parameters;
+mod shader_commands;
 mod shaders;
 mod tidy;
 #[cfg(feature = "preview")]

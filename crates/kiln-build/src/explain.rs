@@ -69,10 +69,13 @@ impl fmt::Display for Change {
             (Some(input), Some(MISSING), Some(_)) => write!(f, "{input} appeared"),
             (Some(input), Some(_), Some(MISSING)) => write!(f, "{input} disappeared"),
             (Some(input), Some(_), Some(_)) => write!(f, "{input} changed"),
-            (Some(input), None, _) => write!(f, "{input} is new"),
+            (Some(input), None, Some(MISSING)) => write!(f, "it looks for {input} too, which is missing"),
+            (Some(input), None, _) => write!(f, "{input} is read too"),
             (None, None, Some(new)) => write!(f, "{} = {new} is new", self.field),
             (None, Some(old), Some(new)) => write!(f, "{} changed from {old} to {new}", self.field),
-            (what, _, None) => write!(f, "{} is gone", what.unwrap_or(&self.field)),
+            (Some(input), Some(MISSING), None) => write!(f, "it looks for {input} no more"),
+            (Some(input), _, None) => write!(f, "{input} is read no more"),
+            (None, _, None) => write!(f, "{} is gone", self.field),
         }
     }
 }

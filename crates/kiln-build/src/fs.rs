@@ -116,15 +116,8 @@ pub fn write_atomically(fs: &dyn FileSystem, path: &Path, bytes: &[u8]) -> Resul
 pub(crate) fn write_all_atomically(fs: &dyn FileSystem, files: &[(PathBuf, &[u8])]) -> Result<(), Error> {
     let mut folders: Vec<&Path> = Vec::new();
     for (path, bytes) in files {
+        replace(fs, path, bytes, Durability::Synced)?;
         let folder = folder_of(path);
-        let temporary = folder.join(temporary_name());
-        let result = write_synced(fs, folder, &temporary, bytes)
-            .and_then(|()| fs.rename(&temporary, path).map_err(Error::io("rename to", path)));
-        if result.is_err() {
-            // What cannot be removed now is collected later.
-            let _ = fs.remove(&temporary);
-            return result;
-        }
         if !folders.contains(&folder) {
             folders.push(folder);
         }
@@ -134,19 +127,54 @@ pub(crate) fn write_all_atomically(fs: &dyn FileSystem, files: &[(PathBuf, &[u8]
         .try_for_each(|folder| fs.sync_folder(folder).map_err(Error::io("sync the folder", folder)))
 }
 
-fn write_synced(fs: &dyn FileSystem, folder: &Path, temporary: &Path, bytes: &[u8]) -> Result<(), Error> {
+/// Writes a file whole, so that a reader sees the old content or the new one. What a power failure leaves of it may be
+/// neither: only for files that are checked when they are read, and whose loss costs nothing but time.
+pub(crate) fn write_unsynced(fs: &dyn FileSystem, path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    replace(fs, path, bytes, Durability::Unsynced)
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Durability {
+    Synced,
+    Unsynced,
+}
+
+fn replace(fs: &dyn FileSystem, path: &Path, bytes: &[u8], durability: Durability) -> Result<(), Error> {
+    let folder = folder_of(path);
+    let temporary = folder.join(temporary_name());
+    let result = write_temporary(fs, folder, &temporary, bytes, durability)
+        .and_then(|()| fs.rename(&temporary, path).map_err(Error::io("rename to", path)));
+    if result.is_err() {
+        // What cannot be removed now is collected later.
+        let _ = fs.remove(&temporary);
+    }
+    result
+}
+
+fn write_temporary(
+    fs: &dyn FileSystem,
+    folder: &Path,
+    temporary: &Path,
+    bytes: &[u8],
+    durability: Durability,
+) -> Result<(), Error> {
     // Folders are there nearly always: asking first would cost more than trying.
     let written = fs.write_new(temporary, bytes).or_else(|error| match error.kind() {
         io::ErrorKind::NotFound => {
             fs.create_folder(folder)?;
-            // The new folder's own name must last, too.
-            fs.sync_folder(folder_of(folder))?;
+            if durability == Durability::Synced {
+                // The new folder's own name must last, too.
+                fs.sync_folder(folder_of(folder))?;
+            }
             fs.write_new(temporary, bytes)
         }
         _ => Err(error),
     });
     written.map_err(Error::io("write", temporary))?;
-    fs.sync(temporary).map_err(Error::io("sync", temporary))
+    match durability {
+        Durability::Synced => fs.sync(temporary).map_err(Error::io("sync", temporary)),
+        Durability::Unsynced => Ok(()),
+    }
 }
 
 /// The folder of a file; of a bare name the present one.

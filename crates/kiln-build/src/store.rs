@@ -9,7 +9,8 @@
 //! ```
 //!
 //! Every file is written whole ([`crate::write_atomically`]), so a killed process leaves either the old file or the new
-//! one. Everything is checked when read: a blob against its name, a document against the digest it begins with. What
+//! one. Artefacts and documents of projects are synced too, so they outlast a power failure; records and scans, which only
+//! save time, are not. Everything is checked when read: a blob against its name, a document against the digest it begins with. What
 //! fails the check is dropped and counts as absent. A cache that cannot be written is read, and what it lacks goes to a
 //! temporary folder.
 
@@ -24,7 +25,7 @@ use std::time::{Duration, SystemTime};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::fs::{FileFacts, temporary_name, write_all_atomically};
+use crate::fs::{FileFacts, temporary_name, write_all_atomically, write_unsynced};
 use crate::sources::lock;
 use crate::{ActionRecord, Digest, Disk, FileSystem, document};
 
@@ -208,18 +209,19 @@ impl Store {
                 files.push((path, bytes));
             }
         }
-        let document;
-        if let Some(record) = record {
-            let path = self.new_path(RECORDS, &record.key(), ".json");
-            document = document::encode(&path, record)?;
-            files.push((path, &document));
-        }
-        let bytes: usize = files.iter().map(|(_, bytes)| bytes.len()).sum();
-        self.written_bytes.fetch_add(bytes as u64, Ordering::Relaxed);
         write_all_atomically(&*self.fs, &files)?;
+        self.note_written(files.iter().map(|(path, bytes)| (path, bytes.len())));
+        let Some(record) = record else { return Ok(()) };
+        // After what it speaks of. It is not synced: without it the action runs again.
+        self.write_document(&self.new_path(RECORDS, &record.key(), ".json"), record)
+    }
+
+    fn note_written<'a>(&self, files: impl IntoIterator<Item = (&'a PathBuf, usize)>) {
         let mut useless = lock(&self.useless);
-        files.iter().for_each(|(path, _)| _ = useless.remove(path));
-        Ok(())
+        for (path, bytes) in files {
+            self.written_bytes.fetch_add(bytes as u64, Ordering::Relaxed);
+            useless.remove(path);
+        }
     }
 
     /// The bytes named `digest`, or `None` if they are absent; damaged ones are removed and count as absent.
@@ -332,9 +334,12 @@ impl Store {
         None
     }
 
-    fn write_document<T: Serialize>(&self, path: &Path, value: &T) -> Result<(), Error> {
+    /// Writes what only saves time.
+    fn write_document<T: Serialize>(&self, path: &PathBuf, value: &T) -> Result<(), Error> {
         let bytes = document::encode(path, value)?;
-        write_all_atomically(&*self.fs, &[(path.to_owned(), &bytes)])
+        write_unsynced(&*self.fs, path, &bytes)?;
+        self.note_written([(path, bytes.len())]);
+        Ok(())
     }
 
     fn roots(&self) -> impl Iterator<Item = &Path> {

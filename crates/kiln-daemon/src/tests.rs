@@ -3,11 +3,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::mpsc::channel;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use notify::event::{AccessKind, CreateKind, EventKind, ModifyKind};
+use notify::event::{AccessKind, AccessMode, CreateKind, EventKind, ModifyKind};
 
-use crate::watch::{Batch, Watch, name_changes, normalise, settle};
+use crate::watch::{Batch, Gathering, Watch, name_changes, normalise, settle};
 
 const LIMIT: Duration = Duration::from_secs(20);
 
@@ -29,6 +29,9 @@ fn event_of_a_file_is_about_that_file_alone() {
     assert_eq!(changes(modified, "/p/shaders/a.wgsl"), names(&["shaders/a.wgsl"]));
     assert!(changes(modified, "/p/baked/manifest.json").is_empty());
     assert!(changes(EventKind::Access(AccessKind::Any), "/p/shaders/a.wgsl").is_empty());
+    let closed = |mode| changes(EventKind::Access(AccessKind::Close(mode)), "/p/shaders/a.wgsl");
+    assert_eq!(closed(AccessMode::Write), names(&["shaders/a.wgsl"]));
+    assert!(closed(AccessMode::Read).is_empty());
 }
 
 #[test]
@@ -57,6 +60,26 @@ fn events_close_together_are_one_batch() {
     let name = |name: &&str| if name.is_empty() { BTreeSet::new() } else { names(&[name]) };
     settle(&events, &|batch: Batch| batches.lock().unwrap().push(batch.files), name, |_| false);
     assert_eq!(batches.into_inner().unwrap(), [names(&["a", "b"])]);
+}
+
+#[test]
+fn readers_of_a_saved_file_keep_nobody_waiting() {
+    let begun = Instant::now();
+    let at = |ms| begun + Duration::from_millis(ms);
+    let mut batch = Gathering::new(begun);
+    batch.add(names(&["a"]), false, at(0));
+    let end_while_written = batch.end;
+    batch.add(names(&["a"]), true, at(1));
+    let end = batch.end;
+    assert!(end < end_while_written, "a whole file waits as long as one being written");
+    batch.add(names(&[]), false, at(2));
+    assert_eq!(batch.end, end);
+    batch.add(names(&["a"]), false, at(2));
+    assert!(batch.end > end, "nobody waits for a file that is being written again");
+    batch.add(names(&["b"]), true, at(3));
+    assert!(batch.end > end_while_written, "several files may be followed by more");
+    (0..1000).for_each(|ms| batch.add(names(&["a"]), false, at(ms)));
+    assert!(batch.end < at(1000), "a file that is never whole is never built");
 }
 
 #[test]
@@ -120,9 +143,9 @@ fn file_of_two_names_changes_under_both() {
 
 #[test]
 fn closed_or_moved_file_is_whole_and_a_written_one_is_not() {
-    use notify::event::{AccessKind, AccessMode, DataChange, ModifyKind, RenameMode};
-    let event = |kind| Ok(notify::Event::new(kind));
-    let ends = |kind| crate::watch::ends_a_save(&event(kind));
+    use notify::event::{DataChange, RenameMode};
+    let event = notify::Event::new;
+    let ends = |kind| crate::watch::ends_a_save(Ok(&event(kind)));
     assert!(ends(EventKind::Access(AccessKind::Close(AccessMode::Write))));
     assert!(ends(EventKind::Modify(ModifyKind::Name(RenameMode::To))));
     assert!(!ends(EventKind::Modify(ModifyKind::Data(DataChange::Any))));

@@ -67,7 +67,7 @@ impl Watch {
         let (folder_of_thread, relevant_of_thread) = (folder.to_owned(), relevant.clone());
         std::thread::spawn(move || {
             let name = |event: &_| name_changes(event, &folder_of_thread, &relevant_of_thread);
-            settle(&events, &settled, name, ends_a_save);
+            settle(&events, &settled, name, |event| ends_a_save(event.as_ref()));
         });
         Ok(Watch { watcher, folder: folder.to_owned(), relevant, outside: BTreeSet::new(), has_links: false })
     }
@@ -154,7 +154,8 @@ pub(crate) fn name_changes(
     if event.need_rescan() {
         return all();
     }
-    if matches!(event.kind, EventKind::Access(_)) {
+    // A file that is closed after writing has changed, if only by an event before; one that is read has not.
+    if matches!(event.kind, EventKind::Access(_)) && !ends_a_save(Ok(event)) {
         return BTreeSet::new();
     }
     let mut names = BTreeSet::new();
@@ -170,15 +171,39 @@ pub(crate) fn name_changes(
 }
 
 /// Whether a file is whole with this event: whoever wrote it closed it, or moved it to its place.
-pub(crate) fn ends_a_save(event: &notify::Result<notify::Event>) -> bool {
+pub(crate) fn ends_a_save(event: Result<&notify::Event, &notify::Error>) -> bool {
     use notify::event::{AccessKind, AccessMode, ModifyKind, RenameMode};
-    event.as_ref().is_ok_and(|event| {
+    event.is_ok_and(|event| {
         matches!(
             event.kind,
             EventKind::Access(AccessKind::Close(AccessMode::Write))
                 | EventKind::Modify(ModifyKind::Name(RenameMode::To | RenameMode::Both))
         )
     })
+}
+
+/// A batch that may go on.
+pub(crate) struct Gathering {
+    files: BTreeSet<String>,
+    begun: Instant,
+    /// When it ends, if nothing more happens.
+    pub(crate) end: Instant,
+}
+
+impl Gathering {
+    pub(crate) fn new(begun: Instant) -> Gathering {
+        Gathering { files: BTreeSet::new(), begun, end: begun }
+    }
+
+    /// An event about these files. What is about none, as a reader that opens one, keeps nobody waiting.
+    pub(crate) fn add(&mut self, files: BTreeSet<String>, is_whole: bool, now: Instant) {
+        if files.is_empty() {
+            return;
+        }
+        self.files.extend(files);
+        let quiet = if is_whole && self.files.len() == 1 { QUIET_AFTER_SAVE } else { QUIET };
+        self.end = (now + quiet).min(self.begun + BATCH_MAX);
+    }
 }
 
 /// Collects events into batches until the sending side is gone. `ends_save` tells events after which one file is whole.
@@ -188,28 +213,20 @@ pub(crate) fn settle<E>(
     name: impl Fn(&E) -> BTreeSet<String>,
     ends_save: impl Fn(&E) -> bool,
 ) {
-    while let Ok(event) = events.recv() {
-        let mut files = name(&event);
-        if files.is_empty() {
-            continue;
-        }
+    while let Ok(mut event) = events.recv() {
         let noticed_unix_ms = unix_ms(SystemTime::now());
-        let begun = Instant::now();
-        let quiet = |files: &BTreeSet<String>, event: &E| match files.len() {
-            1 if ends_save(event) => QUIET_AFTER_SAVE,
-            _ => QUIET,
-        };
-        let mut wait = quiet(&files, &event);
-        while begun.elapsed() < BATCH_MAX {
-            match events.recv_timeout(wait) {
-                Ok(event) => {
-                    files.extend(name(&event));
-                    wait = quiet(&files, &event);
-                }
+        let mut gathering = Gathering::new(Instant::now());
+        loop {
+            let now = Instant::now();
+            gathering.add(name(&event), ends_save(&event), now);
+            event = match events.recv_timeout(gathering.end.saturating_duration_since(now)) {
+                Ok(event) => event,
                 Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => break,
-            }
+            };
         }
-        settled(Batch { files, noticed_unix_ms });
+        if !gathering.files.is_empty() {
+            settled(Batch { files: gathering.files, noticed_unix_ms });
+        }
     }
 }
 

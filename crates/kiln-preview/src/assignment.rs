@@ -115,5 +115,6 @@ fn expected(parameter: &OfferedParameter) -> String {
         Widget::Color => format!("a {ty}, a colour of components from 0 on"),
         Widget::Toggle => "true or false".to_owned(),
         Widget::Choice { names } => format!("one of {}", names.join(", ")),
+        Widget::Number => format!("a {ty}"),
     }
 }

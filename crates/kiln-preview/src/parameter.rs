@@ -44,6 +44,8 @@ impl OfferedParameter {
             Widget::Color => value.max(0.0),
             Widget::Toggle => f64::from(u8::from(value != 0.0)),
             Widget::Choice { names } => value.clamp(0.0, names.len().saturating_sub(1) as f64),
+            Widget::Number if scalar_of(&self.ty) == "u32" => value.max(0.0),
+            Widget::Number => value,
         };
         if self.is_integer() { value.round() } else { value }
     }

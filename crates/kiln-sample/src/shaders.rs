@@ -1,7 +1,15 @@
 //! The shaders that a new project starts with: the repository's own, compiled in.
 
-/// Path in the project and text; every file of the repository's `shaders/pbr` and `shaders/lib`.
+/// Path in the project and text; every file of the repository's `shaders`.
 pub(crate) const SHADERS: &[(&str, &str)] = &[
+    ("shaders/bake/background.wgsl", include_str!("../../../shaders/bake/background.wgsl")),
+    ("shaders/bake/brdf_table.wgsl", include_str!("../../../shaders/bake/brdf_table.wgsl")),
+    ("shaders/bake/cube_mips.wgsl", include_str!("../../../shaders/bake/cube_mips.wgsl")),
+    ("shaders/bake/equirect_to_cube.wgsl", include_str!("../../../shaders/bake/equirect_to_cube.wgsl")),
+    ("shaders/bake/faces.wgsl", include_str!("../../../shaders/bake/faces.wgsl")),
+    ("shaders/bake/irradiance.wgsl", include_str!("../../../shaders/bake/irradiance.wgsl")),
+    ("shaders/bake/prefilter.wgsl", include_str!("../../../shaders/bake/prefilter.wgsl")),
+    ("shaders/bake/source.wgsl", include_str!("../../../shaders/bake/source.wgsl")),
     ("shaders/lib/anisotropy.wgsl", include_str!("../../../shaders/lib/anisotropy.wgsl")),
     ("shaders/lib/brdf.wgsl", include_str!("../../../shaders/lib/brdf.wgsl")),
     ("shaders/lib/colour.wgsl", include_str!("../../../shaders/lib/colour.wgsl")),

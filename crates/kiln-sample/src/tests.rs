@@ -157,7 +157,7 @@ fn tiles_repeat_without_a_seam() {
 fn shader_list_is_what_the_folders_hold() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let mut found = Vec::new();
-    for folder in ["shaders/lib", "shaders/pbr"] {
+    for folder in ["shaders/bake", "shaders/lib", "shaders/pbr"] {
         for entry in std::fs::read_dir(root.join(folder)).unwrap() {
             found.push(format!("{folder}/{}", entry.unwrap().file_name().to_str().unwrap()));
         }

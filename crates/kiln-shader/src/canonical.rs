@@ -16,6 +16,7 @@ use naga::compact::{KeepUnused, compact};
 use naga::proc::{Alignment, Layouter};
 use naga::valid::ModuleInfo;
 use naga::{Expression, Module, StructMember, TypeInner, UniqueArena};
+use rustc_hash::FxHashSet;
 
 use crate::token::{self, Kind, Token};
 
@@ -68,6 +69,9 @@ fn number_values(text: &str) -> Result<String, String> {
     let mut names: BTreeMap<&str, String> = BTreeMap::new();
     let mut at = 0;
     for (index, token) in tokens.iter().enumerate() {
+        if token.kind != Kind::Word {
+            continue;
+        }
         let word = &text[token.range()];
         if word == "fn" {
             names.clear();
@@ -222,8 +226,12 @@ fn restore_names(text: &str, kept: &Kept) -> Result<String, String> {
     let mut restored = String::with_capacity(text.len());
     let mut at = 0;
     for (index, token) in tokens.iter().enumerate() {
+        if token.kind != Kind::Word {
+            continue;
+        }
         let word = &text[token.range()];
-        let name = kept.names.get(word).or_else(|| {
+        let kept_name = if word.starts_with(&kept.prefix) { kept.names.get(word) } else { None };
+        let name = kept_name.or_else(|| {
             let renamed = renamed.get(word)?;
             is_plain_name(text, &tokens, index).then_some(renamed)
         });
@@ -245,14 +253,14 @@ fn restore_names(text: &str, kept: &Kept) -> Result<String, String> {
 /// New names for locals, functions and types that have a kept name.
 fn rename_collisions(text: &str, tokens: &[Token], kept: &Kept) -> BTreeMap<String, String> {
     let words = tokens.iter().filter(|token| token.kind == Kind::Word);
-    let present: BTreeSet<&str> = words.map(|token| &text[token.range()]).collect();
+    let present: FxHashSet<&str> = words.map(|token| &text[token.range()]).collect();
     let mut renamed = BTreeMap::new();
-    for name in present.iter().filter(|name| kept.globals.contains(**name)) {
+    for name in kept.globals.iter().filter(|name| present.contains(name.as_str())) {
         let mut new = format!("{name}_v");
         while present.contains(new.as_str()) || kept.globals.contains(&new) {
             new.push('v');
         }
-        renamed.insert((*name).to_owned(), new);
+        renamed.insert(name.clone(), new);
     }
     renamed
 }

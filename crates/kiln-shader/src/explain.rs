@@ -1,74 +1,49 @@
 //! Turns naga's errors into diagnostics at their author's file and line.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use kiln_diagnostic::{Diagnostic, Span};
 
 use crate::front::{self, Fault};
 use crate::join::Linked;
+use crate::lenient::Lenient;
 use crate::link::Graph;
 use crate::lint::{Allowances, Warning};
 use crate::token::{self, Kind};
 use crate::{limits, suggest};
 
+/// Bytes that the search for further faults has naga read, about: half a second of work.
+const SEARCH_BYTES_MAX: usize = 8 << 20;
+/// Most readings of one text.
+const SEARCH_ROUNDS_MAX: usize = 64;
+
 /// Explains `fault` of the linked text, and what else is wrong: the first fault of every module, since naga stops at its
 /// first.
 pub fn all(graph: &Graph, linked: &Linked, fault: Fault) -> Vec<Diagnostic> {
-    let (Fault::Source(_), Some(&root)) = (&fault, graph.order.last()) else {
-        return vec![diagnostic(graph, linked, fault)];
-    };
-    let mut search = Search { graph, sound: BTreeSet::new(), seen: BTreeSet::new(), faults: BTreeMap::new() };
-    search.look_into(root);
-    if search.faults.is_empty() {
-        return vec![diagnostic(graph, linked, fault)];
-    }
-    search.faults.into_values().collect()
-}
-
-/// Looks for the first fault of each module, from the root to what it imports: what checks together is sound.
-struct Search<'a> {
-    graph: &'a Graph,
-    sound: BTreeSet<usize>,
-    seen: BTreeSet<usize>,
-    faults: BTreeMap<usize, Diagnostic>,
-}
-
-impl Search<'_> {
-    /// How deep modules are nested is bounded by their number.
-    fn look_into(&mut self, index: usize) {
-        if self.sound.contains(&index) || !self.seen.insert(index) {
-            return;
+    let Fault::Source(mut finding) = fault else { return vec![diagnostic(graph, linked, fault)] };
+    let mut faults = BTreeMap::new();
+    let mut rest = Lenient::new(linked);
+    let rounds = (SEARCH_BYTES_MAX / linked.text.len().max(1)).clamp(1, SEARCH_ROUNDS_MAX);
+    for _ in 0..rounds {
+        let place = finding.labels.first().map(|(range, _)| range.clone());
+        let module = place.clone().and_then(|range| linked.origin(range)).map(|(module, _)| module);
+        // What was written for the search is nobody's fault. The first one was found before.
+        let is_own = place.as_ref().is_none_or(|range| range.start < linked.text.len());
+        let is_fault = faults.is_empty() || (is_own && !rest.is_consequence(&finding));
+        if is_fault {
+            let explained = || diagnostic(graph, linked, Fault::Source(finding));
+            faults.entry(module.unwrap_or_default()).or_insert_with(explained);
         }
-        let imports = self.graph.imports_of(index);
-        let whole: Vec<usize> = imports.iter().copied().chain([index]).collect();
-        let mut finding = match self.check(&whole) {
-            None => return self.sound.extend(whole),
-            Some(finding) => finding,
-        };
-        imports.iter().rev().for_each(|import| self.look_into(*import));
-        let usable: Vec<usize> =
-            whole.iter().copied().filter(|module| !self.faults.contains_key(module)).collect();
-        let is_whole = usable.len() == whole.len();
-        if !is_whole {
-            let Some(own) = self.check(&usable) else { return };
-            finding = own;
+        if !place.is_some_and(|range| rest.take_out(range.start, is_fault)) {
+            break;
         }
-        let linked = Linked::join(self.graph, &usable);
-        let place = finding.labels.first().and_then(|(range, _)| linked.origin(range.clone()));
-        // What a broken module would have declared is missing, which is no fault of this one.
-        let is_own = is_whole || !finding.message.starts_with("no definition in scope");
-        if place.is_some_and(|(module, _)| module == index) && is_own {
-            self.faults.insert(index, diagnostic(self.graph, &linked, Fault::Source(finding)));
+        match front::check_linked(&rest.text) {
+            Err(Fault::Source(next)) => finding = next,
+            _ => break,
         }
     }
-
-    fn check(&self, modules: &[usize]) -> Option<Finding> {
-        match front::check_linked(&Linked::join(self.graph, modules).text) {
-            Err(Fault::Source(finding)) => Some(finding),
-            _ => None,
-        }
-    }
+    faults.into_values().collect()
 }
 
 /// Explains `fault` of the linked text.
@@ -108,7 +83,7 @@ pub fn warnings(graph: &Graph, linked: &Linked, warnings: Vec<Warning>) -> Vec<D
 }
 
 /// What naga or the lint found in the linked text.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Finding {
     /// What is wrong.
     pub message: String,
@@ -163,7 +138,7 @@ impl Finder<'_> {
     ) -> Option<String> {
         let text = &self.graph.modules[module].text;
         if message.starts_with("no definition in scope") {
-            let globals = self.graph.modules.iter().flat_map(|module| &module.outline.declarations);
+            let globals = self.graph.modules.iter().flat_map(|module| &module.view.outline.declarations);
             let globals = globals.map(|declaration| declaration.name.name.as_str());
             let builtins = naga::keywords::wgsl::BUILTIN_IDENTIFIERS.iter().copied();
             let names = words(text).into_iter().chain(globals).chain(builtins);

@@ -14,7 +14,7 @@ use crate::{Compiled, canonical, describe, interface, limits};
 const STACK_BYTES: usize = 64 << 20;
 
 /// Why linked text has no compiled form.
-#[derive(Debug, thiserror::Error)]
+#[derive(Clone, Debug, thiserror::Error)]
 pub enum Fault {
     /// The linked text is longer than the limit.
     #[error("linked shader has {actual} bytes, the limit is {limit}")]
@@ -39,7 +39,7 @@ pub enum Fault {
 }
 
 /// A valid linked text.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct LinkedShader {
     /// The shader.
     pub compiled: Compiled,
@@ -69,11 +69,17 @@ fn check_length(text: &str) -> Result<(), Fault> {
 }
 
 /// Compiles stages that were joined: each is canonical by itself, which leaves the order of their declarations open.
-pub fn compile_joined(text: &str) -> Result<Compiled, Fault> {
+/// `name_locals` may name arguments and variables, which changes no text.
+pub fn compile_joined(
+    text: &str,
+    name_locals: impl FnOnce(&mut Module) + Send,
+) -> Result<(Compiled, Vec<LinkedFunction>), Fault> {
     on_deep_stack(Fault::Internal, || {
         let mut module = naga::front::wgsl::parse_str(text).map_err(|error| reparse_fault(&error, text))?;
         validate(&module).map_err(|error| Fault::Source(validation_finding(&module, &error)))?;
-        canonical(&mut module).map(|canonical| canonical.compiled)
+        name_locals(&mut module);
+        let Canonical { compiled, reparsed, .. } = canonical(&mut module)?;
+        Ok((compiled, source_map::functions(&module, &reparsed)))
     })
 }
 
@@ -124,12 +130,19 @@ struct Canonical {
 
 /// Strips, emits and reflects a valid module.
 fn canonical(module: &mut Module) -> Result<Canonical, Fault> {
-    canonical::strip_unused(module);
-    let info = validate(module).map_err(|error| Fault::Internal(format!("after compaction: {error:?}")))?;
+    let info = strip(module)?;
     let wgsl = canonical::emit(module, &info).map_err(Fault::Internal)?;
     let reparsed = naga::front::wgsl::parse_str(&wgsl).map_err(|error| reparse_fault(&error, &wgsl))?;
     let reflection = interface::reflect(module, &info, &reparsed).map_err(Fault::Internal)?;
     Ok(Canonical { compiled: Compiled { wgsl, reflection }, reparsed, info })
+}
+
+/// Strips a valid module of what no entry point uses; returns what naga knows of the rest.
+pub fn strip(module: &mut Module) -> Result<ModuleInfo, Fault> {
+    canonical::strip_unused(module);
+    // It was valid before, and checking it takes as long as all the rest of this.
+    let info = Validator::new(ValidationFlags::empty(), capabilities()).validate(module);
+    info.map_err(|error| Fault::Internal(format!("after compaction: {error:?}")))
 }
 
 fn reparse_fault(error: &ParseError, wgsl: &str) -> Fault {
@@ -142,16 +155,19 @@ fn reparse_fault(error: &ParseError, wgsl: &str) -> Fault {
 
 /// Validates as a wgpu device without optional features does.
 pub fn validate(module: &Module) -> Result<ModuleInfo, Box<WithSpan<ValidationError>>> {
-    // naga's default capabilities are those of a wgpu device without optional features.
+    Validator::new(ValidationFlags::all(), capabilities()).validate(module).map_err(Box::new)
+}
+
+/// naga's default capabilities are those of a wgpu device without optional features.
+fn capabilities() -> Capabilities {
     // Packing halves is no optional feature of WGSL, and devices without it are older than wgpu asks for by default.
-    let capabilities = Capabilities::default() | Capabilities::SHADER_FLOAT16_IN_FLOAT32;
-    Validator::new(ValidationFlags::all(), capabilities).validate(module).map_err(Box::new)
+    Capabilities::default() | Capabilities::SHADER_FLOAT16_IN_FLOAT32
 }
 
 fn parse_finding(error: &ParseError) -> Finding {
     let labels = error.labels().filter_map(|(span, label)| Some((span.to_range()?, label.to_owned())));
     let notes = error.notes().map(str::to_owned).collect();
-    Finding { message: describe::clean(error.message()), notes, labels: labels.collect() }
+    Finding { message: describe::parse_error(error.message()), notes, labels: labels.collect() }
 }
 
 /// What `error` says, in the words of the module.

@@ -26,19 +26,19 @@ struct Segment {
 }
 
 impl Linked {
-    /// Joins modules of a graph without errors, each of which stands after those it imports.
-    pub fn join(graph: &Graph, order: &[usize]) -> Linked {
+    /// Joins the modules of a graph without errors, each after those it imports.
+    pub fn join(graph: &Graph) -> Linked {
         let mut linked = Linked::default();
         let mut seen = BTreeSet::new();
-        for &index in order {
+        for &index in &graph.order {
             let module = &graph.modules[index];
-            for directive in &module.outline.directives {
+            for directive in &module.view.outline.directives {
                 if seen.insert(&module.text[directive.clone()]) {
                     linked.push(index, &module.text, directive.clone());
                 }
             }
         }
-        for &index in order {
+        for &index in &graph.order {
             linked.push_module(index, &graph.modules[index]);
         }
         linked
@@ -77,8 +77,8 @@ impl Linked {
     }
 
     fn push_module(&mut self, index: usize, module: &Module) {
-        let Outline { import_statements, directives, .. } = &module.outline;
-        let cuts = module.cuts.iter().chain(import_statements).chain(directives).map(|cut| (cut, None));
+        let Outline { import_statements, directives, .. } = &module.view.outline;
+        let cuts = module.view.cuts.iter().chain(import_statements).chain(directives).map(|cut| (cut, None));
         let renames = module.renames.iter().map(|(range, name)| (range, Some(name)));
         let mut cuts: Vec<(&Range<usize>, Option<&String>)> = cuts.chain(renames).collect();
         cuts.sort_by_key(|(cut, _)| cut.start);

@@ -1,6 +1,7 @@
 //! Links WGSL modules, validates them with naga, reflects their interface and explains what is wrong.
 //!
-//! Start at [`compile`]: a [`Program`] and a feature set in, canonical WGSL and its [`Reflection`] out.
+//! Start at [`compile`]: a [`Program`] and a feature set in, canonical WGSL and its [`Reflection`] out. Who compiles many
+//! keeps a [`Compiler`].
 //!
 //! Sources are WGSL with a subset of WESL's imports and conditions; `docs/shader-interface.md` describes it.
 //!
@@ -14,12 +15,14 @@ use std::collections::BTreeSet;
 use kiln_diagnostic::Diagnostic;
 use serde::{Deserialize, Serialize};
 
+pub use compiler::Compiler;
 pub use emit::*;
 pub use link::Read;
 pub use reflect::*;
 pub use source_map::{FunctionSource, SourceMap};
 
 mod canonical;
+mod compiler;
 mod condition;
 mod describe;
 mod emit;
@@ -28,6 +31,8 @@ mod front;
 mod glsl;
 mod interface;
 mod join;
+mod lenient;
+mod library;
 mod limits;
 mod link;
 mod lint;
@@ -120,10 +125,7 @@ impl Program {
 /// Compiles a program for a set of features: in WGSL they are what `@if` asks for, in GLSL the feature `sheen` is the macro
 /// `FEATURE_SHEEN`. `read` gets paths relative to the project and is asked at most once for each.
 pub fn compile(program: &Program, features: &BTreeSet<String>, read: &mut Read<'_>) -> Outcome {
-    match program.is_glsl() {
-        true => glsl::compile(program, features, false, read),
-        false => wgsl::compile(program.subject(), features, false, read),
-    }
+    Compiler::default().compile(program, features, read)
 }
 
 /// Does what [`compile`] does, and warns of what is valid but doubtful: arguments at the edge of a function's
@@ -133,10 +135,7 @@ pub fn compile(program: &Program, features: &BTreeSet<String>, read: &mut Read<'
 /// `// kiln: allow(domain) why`, with the name of the lint that a warning ends with, on its line or the line
 /// above allows it.
 pub fn lint(program: &Program, features: &BTreeSet<String>, read: &mut Read<'_>) -> Outcome {
-    match program.is_glsl() {
-        true => glsl::compile(program, features, true, read),
-        false => wgsl::compile(program.subject(), features, true, read),
-    }
+    Compiler::default().lint(program, features, read)
 }
 
 /// What a shader may need, under any features.

@@ -6,13 +6,10 @@ use std::sync::Arc;
 
 use kiln_diagnostic::{Diagnostic, Span};
 
-use crate::condition::{self, Mode};
-use crate::limits;
-use crate::module::{self, Import, Name, Outline, QualifiedName};
-use crate::resolve;
-use crate::scope;
-use crate::token::{self, OpenComment};
-use crate::{Dependency, suggest};
+use crate::condition::Mode;
+use crate::library::{Library, View};
+use crate::module::{Import, Name, QualifiedName};
+use crate::{Dependency, limits, resolve, scope, suggest};
 
 /// Reads a file of the project, by its path relative to it.
 pub type Read<'a> = dyn FnMut(&str) -> Option<Arc<str>> + 'a;
@@ -25,13 +22,7 @@ pub struct Module {
     /// Its text.
     pub text: Arc<str>,
     /// What it imports and declares under the given features.
-    pub outline: Outline,
-    /// Names that conditions cut away.
-    hidden: BTreeSet<String>,
-    /// What conditions cut.
-    pub cuts: Vec<Range<usize>>,
-    /// Modules it imports.
-    targets: Vec<usize>,
+    pub view: Arc<View>,
     /// Imported names, as they are called here: module and name there.
     pub names: BTreeMap<String, (usize, String)>,
     /// Imported modules, as they are called here.
@@ -68,9 +59,9 @@ pub struct Graph {
 
 impl Graph {
     /// Loads `root` and, transitively, what it imports.
-    pub fn load(root: &str, mode: Mode<'_>, read: &mut Read<'_>) -> Graph {
-        let mut loader =
-            Loader { mode, read, graph: Graph::default(), known: BTreeMap::new(), stack: Vec::new() };
+    pub fn load(root: &str, mode: Mode<'_>, library: &mut Library, read: &mut Read<'_>) -> Graph {
+        let (graph, known, stack) = (Graph::default(), BTreeMap::new(), Vec::new());
+        let mut loader = Loader { mode, library, read, graph, known, stack };
         match loader.read_file(root) {
             Some(text) => {
                 loader.load_module(root, text, None);
@@ -85,17 +76,6 @@ impl Graph {
         let mut faults = scope::resolve(&mut graph);
         graph.diagnostics.append(&mut faults);
         graph
-    }
-
-    /// All that a module imports, directly or not, each after those it imports itself.
-    pub fn imports_of(&self, index: usize) -> Vec<usize> {
-        let mut needed = BTreeSet::new();
-        let mut open = vec![index];
-        while let Some(module) = open.pop() {
-            let targets = self.modules[module].targets.iter();
-            open.extend(targets.filter(|target| needed.insert(**target)));
-        }
-        self.order.iter().copied().filter(|module| *module != index && needed.contains(module)).collect()
     }
 
     /// `imported by …` from module `index` up to the root.
@@ -122,11 +102,11 @@ impl Graph {
     fn check_imported_names(&mut self) {
         let mut found = Vec::new();
         for (index, module) in self.modules.iter().enumerate() {
-            for item in module.outline.imports.iter().flat_map(|import| &import.items) {
+            for item in module.view.outline.imports.iter().flat_map(|import| &import.items) {
                 let Some((target, _)) = module.names.get(&item.local().name) else { continue };
                 found.extend(self.check_imported_name(index, *target, &item.name));
             }
-            for qualified in &module.outline.qualified {
+            for qualified in &module.view.outline.qualified {
                 let target = module.paths.iter().find(|(range, _)| *range == qualified.range);
                 found.extend(
                     target.and_then(|(_, (target, _))| {
@@ -140,18 +120,18 @@ impl Graph {
 
     fn check_imported_name(&self, importer: usize, target: usize, item: &Name) -> Option<Diagnostic> {
         let module = &self.modules[target];
-        if module.outline.declarations.iter().any(|declaration| declaration.name.name == item.name) {
+        if module.view.outline.declarations.iter().any(|declaration| declaration.name.name == item.name) {
             return None;
         }
         let message = format!("module `{}` does not declare `{}`", module.path, item.name);
         let diagnostic = self.error_at(importer, item.range.clone(), message);
-        if module.hidden.contains(&item.name) {
+        if module.view.hidden.contains(&item.name) {
             return Some(diagnostic.with_help(format!(
                 "`{}` is declared there under an `@if` that does not hold; put this import under the same `@if`",
                 item.name
             )));
         }
-        let names = module.outline.declarations.iter().map(|declaration| declaration.name.name.as_str());
+        let names = module.view.outline.declarations.iter().map(|declaration| declaration.name.name.as_str());
         Some(match suggest::closest(&item.name, names) {
             Some(name) => diagnostic.with_help(format!("did you mean `{name}`?")),
             None => diagnostic,
@@ -161,6 +141,7 @@ impl Graph {
 
 struct Loader<'a, 'r> {
     mode: Mode<'a>,
+    library: &'a mut Library,
     read: &'a mut Read<'r>,
     graph: Graph,
     /// What reading each path gave, so that a path is read once.
@@ -205,56 +186,31 @@ impl Loader<'_, '_> {
         self.known.insert(path.to_owned(), Known::Module(index));
         let module = Module { path: path.to_owned(), text, imported_by, ..Module::default() };
         self.graph.modules.push(module);
-        self.outline(index);
+        let view = self.view(index);
         self.stack.push(index);
-        for import in self.graph.modules[index].outline.imports.clone() {
-            self.import(index, &import);
+        for import in &view.outline.imports {
+            self.import(index, import);
         }
-        for qualified in self.graph.modules[index].outline.qualified.clone() {
-            self.resolve_qualified(index, &qualified);
+        for qualified in &view.outline.qualified {
+            self.resolve_qualified(index, qualified);
         }
         self.stack.pop();
         self.graph.order.push(index);
         index
     }
 
-    fn outline(&mut self, index: usize) {
-        let Module { path, text, .. } = &self.graph.modules[index];
-        let (path, text) = (path.clone(), Arc::clone(text));
-        let mut diagnostics = Vec::new();
-        match self.tokens(&path, &text) {
-            Ok(tokens) => {
-                let decided = condition::decide(&path, &text, &tokens, self.mode, &mut diagnostics);
-                let outline = module::outline(&path, &text, &decided.kept, &mut diagnostics);
-                let module = &mut self.graph.modules[index];
-                module.hidden = hidden_names(&path, &text, &tokens, &outline);
-                (module.outline, module.cuts) = (outline, decided.cuts);
-                self.graph.features.extend(decided.features);
-            }
-            Err(diagnostic) => diagnostics.push(*diagnostic),
-        }
-        let chain = self.graph.import_chain(index);
-        for mut diagnostic in diagnostics {
-            diagnostic.notes.extend(chain.iter().cloned());
+    /// Gives a module what it imports and declares, and reports what is wrong with it.
+    fn view(&mut self, index: usize) -> Arc<View> {
+        let module = &mut self.graph.modules[index];
+        let view = self.library.view(&module.path, &module.text, self.mode);
+        module.view = Arc::clone(&view);
+        self.graph.features.extend(view.features.iter().cloned());
+        for diagnostic in &view.diagnostics {
+            let mut diagnostic = diagnostic.clone();
+            diagnostic.notes.extend(self.graph.import_chain(index));
             self.graph.diagnostics.push(diagnostic);
         }
-    }
-
-    fn tokens(&self, path: &str, text: &str) -> Result<Vec<token::Token>, Box<Diagnostic>> {
-        if text.len() > limits::MODULE_BYTES_MAX {
-            let (limit, actual) = (limits::MODULE_BYTES_MAX, text.len());
-            let message = format!("module has {actual} bytes, the limit is {limit}");
-            return Err(Box::new(Diagnostic::error(message).in_file(path)));
-        }
-        if let Some(at) = text.find(['\0', char::REPLACEMENT_CHARACTER]) {
-            let diagnostic = Diagnostic::error("this is not a UTF-8 text");
-            return Err(Box::new(diagnostic.in_file(path).with_note(format!("first at byte {at}"))));
-        }
-        let tokens = token::tokenize(text).map_err(|OpenComment(at)| {
-            Box::new(Diagnostic::error("`/*` is never closed").at(path, text, at..at + 2))
-        })?;
-        limits::check_nesting(text, &tokens).map_err(|fault| Box::new(nesting_error(path, text, fault)))?;
-        Ok(tokens)
+        view
     }
 
     /// Finds and loads what `import` of module `importer` names: a module that has the items, or modules called like them.
@@ -333,10 +289,6 @@ impl Loader<'_, '_> {
                     index
                 }
             };
-            let targets = &mut self.graph.modules[importer].targets;
-            if !targets.contains(&target) {
-                targets.push(target);
-            }
             return Found::Module(target);
         }
         Found::Nowhere(candidates)
@@ -379,29 +331,4 @@ enum Found {
     Nowhere(Vec<String>),
     /// It was said why.
     Refused,
-}
-
-fn nesting_error(path: &str, text: &str, fault: limits::Fault) -> Diagnostic {
-    let diagnostic = Diagnostic::error(&fault.message).at(path, text, fault.range);
-    if let Some(opened) = fault.opened {
-        let span = Span::new(text, opened.clone());
-        let note = format!("`{}` was opened at {path}:{}:{}", &text[opened], span.line, span.column);
-        return diagnostic.with_note(note);
-    }
-    if fault.message.starts_with("expression") {
-        return diagnostic.with_help("split it with `let`, or end an `else if` chain with `switch`");
-    }
-    diagnostic
-}
-
-/// Names that the module declares under other features only.
-fn hidden_names(path: &str, text: &str, tokens: &[token::Token], kept: &Outline) -> BTreeSet<String> {
-    // Diagnostics of this second look would repeat those of the first.
-    let mut ignored = Vec::new();
-    let all = condition::decide(path, text, tokens, Mode::Everything, &mut ignored);
-    let outline = module::outline(path, text, &all.kept, &mut ignored);
-    let visible: BTreeSet<&str> =
-        kept.declarations.iter().map(|declaration| declaration.name.name.as_str()).collect();
-    let names = outline.declarations.into_iter().map(|declaration| declaration.name.name);
-    names.filter(|name| !visible.contains(name.as_str())).collect()
 }

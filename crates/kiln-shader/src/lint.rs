@@ -77,7 +77,7 @@ impl Rule {
 }
 
 /// Something that the lint found.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Warning {
     /// The rule it breaks.
     pub rule: Rule,

@@ -148,6 +148,23 @@ fn declaration(code: &str) -> Result<(&str, Option<f64>), String> {
     Ok((&code[name.ok_or_else(nowhere)?.range()], value))
 }
 
+/// Gives the parameter `name` its first value, unless its annotation says one; without an annotation it becomes one.
+pub(crate) fn give_first(annotations: &mut Vec<Annotation>, name: &str, is_flag: bool, value: Vec<f64>) {
+    match annotations.iter_mut().find(|annotation| annotation.name == name) {
+        Some(annotation) if annotation.default.is_empty() => annotation.default = value,
+        Some(_) => {}
+        None => {
+            let widget = if is_flag { Widget::Toggle } else { Widget::Number };
+            annotations.push(Annotation {
+                name: name.to_owned(),
+                widget,
+                default: value,
+                label: String::new(),
+            });
+        }
+    }
+}
+
 /// The parameters that a shader has: annotations whose name is an override or a member of a uniform. A color may have a
 /// fourth component, which is 1.
 pub(crate) fn parameters(reflection: &Reflection, annotations: Vec<Annotation>) -> Vec<Parameter> {

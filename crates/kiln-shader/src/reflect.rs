@@ -32,7 +32,8 @@ pub struct Override {
     pub default: Option<f64>,
 }
 
-/// An override or a uniform's member that the author annotated, as `// @slider(0, 1, 0.5)`.
+/// An override or a uniform's member that the author annotated, as `// @slider(0, 1, 0.5)`, or a uniform of GLSL with
+/// an initial value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
     /// Its name.
@@ -65,6 +66,8 @@ pub enum ParameterPlace {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Widget {
+    /// Any numbers, as many as the first value has.
+    Number,
     /// A number between two.
     Slider {
         /// The least value.

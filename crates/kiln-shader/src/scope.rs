@@ -11,7 +11,7 @@ use kiln_diagnostic::{Diagnostic, Span};
 
 use crate::link::{Graph, Module};
 use crate::module::{Declaration, Item, Name};
-use crate::token::{self, Kind, Token};
+use crate::token::{Kind, Token};
 
 /// A declaration: its module and its name there.
 type Declared = (usize, String);
@@ -37,7 +37,7 @@ pub fn resolve(graph: &mut Graph) -> Vec<Diagnostic> {
 fn colliding(graph: &Graph, faults: &mut Vec<Diagnostic>) -> BTreeSet<Declared> {
     let mut owners: BTreeMap<&str, Vec<(usize, &Declaration)>> = BTreeMap::new();
     for (index, module) in graph.modules.iter().enumerate() {
-        for declaration in &module.outline.declarations {
+        for declaration in &module.view.outline.declarations {
             owners.entry(&declaration.name.name).or_default().push((index, declaration));
         }
     }
@@ -58,8 +58,8 @@ fn colliding(graph: &Graph, faults: &mut Vec<Diagnostic>) -> BTreeSet<Declared> 
         }
     }
     for (index, module) in graph.modules.iter().enumerate() {
-        let own = &module.outline.declarations;
-        for name in module.outline.imports.iter().flat_map(|import| &import.items).map(Item::local) {
+        let own = &module.view.outline.declarations;
+        for name in module.view.outline.imports.iter().flat_map(|import| &import.items).map(Item::local) {
             if let Some(declared) = own.iter().find(|declaration| declaration.name.name == name.name) {
                 faults.push(declared_twice(graph, (index, name), (index, &declared.name)));
             }
@@ -94,7 +94,7 @@ fn captured(graph: &Graph, faults: &mut Vec<Diagnostic>) -> BTreeSet<Declared> {
                 }
                 continue;
             }
-            let declared = graph.modules[*target].outline.declarations.iter();
+            let declared = graph.modules[*target].view.outline.declarations.iter();
             if declared.into_iter().any(|declaration| declaration.name.name == *name && declaration.is_public)
             {
                 let message =
@@ -112,9 +112,9 @@ fn captured(graph: &Graph, faults: &mut Vec<Diagnostic>) -> BTreeSet<Declared> {
 /// Words of a module that stand neither in imports nor in paths, with the first place of each.
 fn own_words(module: &Module) -> BTreeMap<&str, Range<usize>> {
     let mut words = BTreeMap::new();
-    for token in tokens(module) {
-        let is_apart = module.paths.iter().any(|(range, _)| contains(range, &token))
-            || module.outline.import_statements.iter().any(|range| contains(range, &token));
+    for token in module.view.tokens.iter() {
+        let is_apart = module.paths.iter().any(|(range, _)| contains(range, token))
+            || module.view.outline.import_statements.iter().any(|range| contains(range, token));
         if token.kind == Kind::Word && !is_apart {
             words.entry(&module.text[token.range()]).or_insert(token.range());
         }
@@ -124,8 +124,8 @@ fn own_words(module: &Module) -> BTreeMap<&str, Range<usize>> {
 
 /// Where `name` is declared inside a function: behind `let`, `var` or `const`, or before the `:` of a parameter.
 fn local_declaration(module: &Module, name: &str) -> Option<Range<usize>> {
-    let (text, tokens) = (&*module.text, tokens(module));
-    let members = member_declarations(text, &tokens);
+    let (text, tokens) = (&*module.text, &module.view.tokens);
+    let members = member_declarations(text, tokens);
     let is_declared = |at: usize| {
         let before = at.checked_sub(1).map(|at| &tokens[at]);
         let is_word = |token: &&Token| ["let", "var", "const"].iter().any(|word| token.is_word(text, word));
@@ -140,16 +140,11 @@ fn contains(range: &Range<usize>, token: &Token) -> bool {
     range.start <= token.start && token.end <= range.end
 }
 
-/// Text that does not tokenise has been reported, and is not joined.
-fn tokens(module: &Module) -> Vec<Token> {
-    token::tokenize(&module.text).unwrap_or_default()
-}
-
 /// New names: the old with the module's file name, unless some module has such a word.
 fn invent(graph: &Graph, changed: BTreeSet<Declared>) -> BTreeMap<Declared, String> {
     let mut taken: BTreeSet<String> = BTreeSet::new();
     for module in &graph.modules {
-        let words = tokens(module).into_iter().filter(|token| token.kind == Kind::Word);
+        let words = module.view.tokens.iter().filter(|token| token.kind == Kind::Word);
         taken.extend(words.map(|token| module.text[token.range()].to_owned()));
     }
     let mut names = BTreeMap::new();
@@ -173,7 +168,7 @@ fn renames(
 ) -> Vec<(Range<usize>, String)> {
     let module = &graph.modules[index];
     let global = |declared: &Declared| global_names.get(declared).unwrap_or(&declared.1).clone();
-    let own = module.outline.declarations.iter().map(|declaration| &declaration.name.name);
+    let own = module.view.outline.declarations.iter().map(|declaration| &declaration.name.name);
     let own = own.map(|name| (name.as_str(), global(&(index, name.clone()))));
     let imported = module.names.iter().map(|(local, declared)| (local.as_str(), global(declared)));
     let mut visible: BTreeMap<&str, String> = imported.chain(own).collect();
@@ -181,8 +176,8 @@ fn renames(
     let paths = module.paths.iter().map(|(range, declared)| (range.clone(), global(declared)));
     let mut renames: Vec<(Range<usize>, String)> = paths.collect();
     if !visible.is_empty() {
-        let tokens = tokens(module);
-        let members = member_declarations(&module.text, &tokens);
+        let tokens = &module.view.tokens;
+        let members = member_declarations(&module.text, tokens);
         for (at, token) in tokens.iter().enumerate() {
             let is_component = at > 0 && (tokens[at - 1].is('.') || tokens[at - 1].is('@'));
             let is_apart = module.paths.iter().any(|(range, _)| contains(range, token));

@@ -37,7 +37,8 @@ pub struct FunctionSource {
 /// A function, with its bytes in the linked text.
 #[derive(Clone, Debug)]
 pub(crate) struct LinkedFunction {
-    source: FunctionSource,
+    /// What is known of it without its author's file; `source_name` is its name in the linked text.
+    pub(crate) source: FunctionSource,
     range: Option<Range<usize>>,
 }
 

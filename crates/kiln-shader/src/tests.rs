@@ -7,7 +7,10 @@ use crate::{Compiled, Outcome, Program, compile};
 
 mod canonical;
 mod cases;
+mod compiler;
 mod conditions;
+#[path = "../../kiln-worker/tests/fuzz/damage.rs"]
+mod damage;
 mod diagnostics;
 mod emit;
 mod hostile;
@@ -16,8 +19,11 @@ mod lint;
 mod mutations;
 mod names;
 mod parameters;
+#[path = "../../kiln-worker/tests/fuzz/random.rs"]
+mod random;
 mod ranges;
 mod shaders;
+mod source_maps;
 
 /// A project in memory.
 struct Files(BTreeMap<String, Arc<str>>);

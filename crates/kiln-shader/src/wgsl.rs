@@ -7,12 +7,19 @@ use kiln_diagnostic::{Diagnostic, has_errors};
 use crate::condition::Mode;
 use crate::front::Fault;
 use crate::join::Linked;
+use crate::library::Library;
 use crate::link::{Graph, Read};
-use crate::{Outcome, Scan, explain, front, parameter, source_map};
+use crate::{Compiler, Outcome, Scan, explain, parameter, source_map};
 
 /// Compiles the root module `root`; with `lints`, also warns of what is doubtful.
-pub fn compile(root: &str, features: &BTreeSet<String>, lints: bool, read: &mut Read<'_>) -> Outcome {
-    let mut graph = Graph::load(root, Mode::Features(features), read);
+pub fn compile(
+    compiler: &mut Compiler,
+    root: &str,
+    features: &BTreeSet<String>,
+    lints: bool,
+    read: &mut Read<'_>,
+) -> Outcome {
+    let mut graph = Graph::load(root, Mode::Features(features), &mut compiler.library, read);
     let mut outcome = Outcome {
         diagnostics: std::mem::take(&mut graph.diagnostics),
         dependencies: std::mem::take(&mut graph.dependencies),
@@ -22,8 +29,8 @@ pub fn compile(root: &str, features: &BTreeSet<String>, lints: bool, read: &mut 
     if has_errors(&outcome.diagnostics) {
         return outcome;
     }
-    let linked = Linked::join(&graph, &graph.order);
-    match front::compile_linked(&linked.text, lints) {
+    let linked = Linked::join(&graph);
+    match compiler.compile_linked(&linked.text, lints) {
         Ok(shader) => {
             if lints {
                 outcome.diagnostics.extend(explain::warnings(&graph, &linked, shader.warnings));
@@ -50,6 +57,6 @@ fn annotations(graph: &Graph, diagnostics: &mut Vec<Diagnostic>) -> Vec<paramete
 
 /// Looks at imports and conditions under any features.
 pub fn scan(root: &str, read: &mut Read<'_>) -> Scan {
-    let graph = Graph::load(root, Mode::Everything, read);
+    let graph = Graph::load(root, Mode::Everything, &mut Library::default(), read);
     Scan { dependencies: graph.dependencies, features: graph.features }
 }

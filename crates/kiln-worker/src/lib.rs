@@ -22,7 +22,7 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use kiln_diagnostic::Diagnostic;
-use kiln_shader::{Emitted, Language, Outcome, Program};
+use kiln_shader::{Compiler, Emitted, Language, Outcome, Program};
 
 pub use host::{Died, Limits, Workers};
 pub use serve::serve;
@@ -91,6 +91,6 @@ fn other_answer() -> Died {
 fn run(task: &Task) -> Result<Reply, Died> {
     match WORKERS.get() {
         Some(workers) => workers.run(task),
-        None => Ok(task.perform()),
+        None => Ok(task.perform(&mut Compiler::default())),
     }
 }

@@ -4,6 +4,8 @@ use std::io;
 use std::process::exit;
 use std::sync::mpsc::channel;
 
+use kiln_shader::Compiler;
+
 use crate::frame;
 use crate::task::Task;
 
@@ -34,8 +36,10 @@ pub fn serve() -> io::Result<()> {
         }
     })?;
     let mut replies = io::stdout().lock();
+    // Tasks are often variants of one shader.
+    let mut compiler = Compiler::default();
     for task in tasks {
-        frame::write(&mut replies, &task.perform())?;
+        frame::write(&mut replies, &task.perform(&mut compiler))?;
     }
     Ok(())
 }

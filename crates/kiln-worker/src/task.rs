@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use kiln_diagnostic::Diagnostic;
-use kiln_shader::{Emitted, Language, Outcome, Program};
+use kiln_shader::{Compiler, Emitted, Language, Outcome, Program};
 use serde::{Deserialize, Serialize};
 
 /// A shader's files: the text of each, by its path relative to the project; those that are missing too.
@@ -52,11 +52,11 @@ pub enum Reply {
 
 impl Task {
     /// Does the work here and now.
-    pub fn perform(&self) -> Reply {
+    pub fn perform(&self, compiler: &mut Compiler) -> Reply {
         match self {
             Task::Compile { program, features, sources, lints } => {
-                let compile = if *lints { kiln_shader::lint } else { kiln_shader::compile };
-                Reply::Compiled(compile(program, features, &mut |path| sources.read(path)))
+                let compile = if *lints { Compiler::lint } else { Compiler::compile };
+                Reply::Compiled(compile(compiler, program, features, &mut |path| sources.read(path)))
             }
             Task::Emit { wgsl, language } => {
                 Reply::Emitted(kiln_shader::emit(wgsl, *language).map_err(|error| error.diagnostic()))

@@ -13,6 +13,7 @@ mod lobes;
 mod passes;
 mod reference;
 mod samples;
+mod semantics;
 mod support;
 mod tutorials;
 mod twins;

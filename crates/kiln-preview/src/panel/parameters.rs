@@ -81,6 +81,14 @@ fn show_widget(ui: &mut Ui, parameter: &OfferedParameter, value: &mut [f64], lab
             let Some(component) = value.first_mut() else { return };
             show_choice(ui, parameter, names, component);
         }
+        Widget::Number => {
+            for component in value {
+                let speed = (component.abs() * 0.01).max(if parameter.is_integer() { 0.1 } else { 0.001 });
+                let number = egui::DragValue::new(component).speed(speed);
+                let number = if parameter.is_integer() { number.max_decimals(0) } else { number };
+                ui.add(number).labelled_by(label);
+            }
+        }
     }
 }
 

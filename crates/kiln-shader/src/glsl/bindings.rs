@@ -27,11 +27,11 @@ struct Wanted {
 }
 
 /// The sampler of a combined type; comparing ones are not shared.
-pub fn sampler_name(variable: &Variable, combined: &builtin::Combined) -> String {
+pub fn sampler_name(texture: &str, combined: &builtin::Combined) -> String {
     if combined.sampler == "samplerShadow" {
-        format!("{}_sampler", variable.name.text)
+        format!("{texture}_sampler")
     } else {
-        names::sampler_of(&variable.name.text)
+        names::sampler_of(texture)
     }
 }
 
@@ -119,8 +119,8 @@ fn variable_wants(variable: &Variable, wanted: &mut Vec<Wanted>) {
     let (name, place) = (variable.name.text.to_string(), variable.place());
     if let Some(combined) = builtin::combined(&variable.ty.text) {
         let group = names::group_of_resource(&name);
+        let sampler = sampler_name(&name, &combined);
         wanted.push(Wanted::new(name, group, &variable.qualifiers, place));
-        let sampler = sampler_name(variable, &combined);
         let group = match names::group_of_resource(&sampler) {
             Group::Params => group,
             known => known,

@@ -62,6 +62,17 @@ pub fn columns(ty: &str) -> Option<u32> {
     in_range(columns)
 }
 
+/// Rows of a matrix type.
+pub fn rows(ty: &str) -> Option<u32> {
+    columns(ty)?;
+    ty.bytes().last().filter(u8::is_ascii_digit).map(|digit| u32::from(digit - b'0'))
+}
+
+/// Whether `ty` has two columns of two rows.
+pub fn is_mat2(ty: &str) -> bool {
+    ty == "mat2" || ty == "mat2x2"
+}
+
 /// The present name of a function that older versions spell otherwise.
 pub fn modern(name: &str) -> Option<&'static str> {
     Some(match name {
@@ -106,6 +117,12 @@ pub fn polyfill(name: &str) -> Option<String> {
             .map(|ty| format!("{ty} kiln_modf({ty} x, out {ty} i) {{ i = trunc(x); return x - i; }}\n"))
             .concat(),
         "outerProduct" => outer_products(),
+        "mat2" => {
+            let others =
+                ["float", "mat2", "mat2x3", "mat2x4", "mat3x2", "mat3", "mat3x4", "mat4x2", "mat4x3", "mat4"];
+            let others = others.map(|ty| format!("mat2 kiln_mat2({ty} v) {{ return mat2(v); }}\n")).concat();
+            format!("mat2 kiln_mat2(vec4 v) {{ return mat2(v.xy, v.zw); }}\n{others}")
+        }
         "matrixCompMult" => [2, 3, 4].into_iter().map(component_product).collect(),
         _ => return None,
     })

@@ -3,10 +3,13 @@
 use std::collections::BTreeSet;
 
 use super::Parsed;
+use super::bindings;
 use super::builtin;
 use super::declare::{Block, DROPPED, Item, Qualifiers, Struct, Variable};
 use super::lex::Token;
+use super::scene;
 use super::source::{Place, Sources};
+use crate::names;
 
 /// Layouts that are understood, or change nothing because everything is filled by name.
 const LAYOUTS: [&str; 22] = [
@@ -36,10 +39,10 @@ const LAYOUTS: [&str; 22] = [
 
 /// Layouts that ask for what is not there, with what to do instead.
 const REFUSED_LAYOUTS: [(&str, &str); 17] = [
-    ("align", "leave it out, and put a member before this one to move it"),
+    ("align", "only members of blocks have an alignment"),
     ("index", "WGSL has one colour for each location: leave out the second source"),
-    ("offset", "leave it out, and put a member before this one to move it"),
-    ("row_major", "leave it out, and give the transposed matrix or write `transpose(m)`"),
+    ("offset", "only members of blocks have an offset"),
+    ("row_major", "write it at a block or its members"),
     ("scalar", "use `std430`, and `float` members in place of a `vec3` that others follow closely"),
     ("bindless_sampler", "declare each texture as a uniform"),
     ("bindless_image", "declare each image as a uniform"),
@@ -75,10 +78,43 @@ pub fn layouts(sources: &mut Sources<'_, '_>, qualifiers: &Qualifiers) {
     layouts_but(sources, qualifiers, &[]);
 }
 
-/// Checks the layouts of a block's member. Push constants become a uniform that is filled by name: where they lie does not
-/// matter, and stages share one block by giving each its part.
-pub fn member_layouts(sources: &mut Sources<'_, '_>, qualifiers: &Qualifiers, is_pushed: bool) {
-    layouts_but(sources, qualifiers, if is_pushed { &["offset", "align"] } else { &[] });
+/// Checks the layouts of a declaration without a variable, as `layout(row_major) uniform;`.
+pub fn default_layouts(sources: &mut Sources<'_, '_>, qualifiers: &Qualifiers) {
+    let is_of_blocks = qualifiers.is("uniform") || qualifiers.is("buffer");
+    layouts_but(sources, qualifiers, if is_of_blocks { &["row_major"] } else { &[] });
+}
+
+/// Checks the layouts of a block and of its members, which say where they lie.
+pub fn block_layouts(sources: &mut Sources<'_, '_>, stage: &Parsed, block: &Block) {
+    layouts_but(sources, &block.qualifiers, &["align", "row_major"]);
+    for member in &block.members {
+        layouts_but(sources, &member.qualifiers, &["offset", "align", "row_major"]);
+        if scene::is_row_major(stage, block, member) {
+            row_major(sources, stage, block, member);
+        }
+    }
+}
+
+/// A matrix in rows is stored as its transpose, which is turned round where it is read.
+fn row_major(sources: &mut Sources<'_, '_>, stage: &Parsed, block: &Block, member: &Variable) {
+    let is_known = names::GROUPS.iter().any(|group| group.block() == bindings::block_name(block));
+    let is_written = block.qualifiers.is("buffer") && buffer_access(block).is_empty();
+    let has_members = structure(stage, &member.ty).is_some();
+    let (why, help) = if is_known {
+        ("but Kiln fills it in columns", "leave `row_major` out")
+    } else if is_written {
+        (
+            "which a shader cannot write",
+            "declare the buffer `readonly`, or store the transpose and write `transpose(m)`",
+        )
+    } else if block.is_flattened() {
+        ("and its block has an array without length", "leave the name of the instance out")
+    } else if has_members {
+        ("but is a struct", "declare its matrices as members of the block")
+    } else {
+        return;
+    };
+    report(sources, member.place(), format!("`{}` is stored in rows, {why}", member.name.text), help);
 }
 
 fn layouts_but(sources: &mut Sources<'_, '_>, qualifiers: &Qualifiers, free: &[&str]) {
@@ -250,6 +286,23 @@ pub fn image_format(sources: &mut Sources<'_, '_>, variable: &Variable) {
     if variable.ty.text.contains("image") && !has_format {
         let message = format!("the image `{}` has no format", variable.name.text);
         report(sources, variable.place(), message, "write it in the layout, as in `layout(rgba8)`");
+    }
+}
+
+/// Checks that a separate texture is compared or read, but not both: the two are of different types.
+pub fn comparison(sources: &mut Sources<'_, '_>, stage: &Parsed, variable: &Variable) {
+    if !variable.ty.text.contains("texture") {
+        return;
+    }
+    let uses = stage.tokens.windows(3).filter(|join| join[1].is("(") && join[2].text == variable.name.text);
+    let joined = uses.filter_map(|join| Some((&join[0], builtin::combined(&join[0].text)?.sampler)));
+    let (compared, read): (Vec<_>, Vec<_>) = joined.partition(|(_, sampler)| *sampler == "samplerShadow");
+    if let (Some((first, _)), Some((other, _))) = (read.first(), compared.first()) {
+        let message = format!("`{}` is read here, and compared elsewhere", variable.name.text);
+        let mut fault = sources.error(first.place, message);
+        fault.notes.insert(0, format!("compared at {}", sources.describe(other.place)));
+        let help = "declare a second texture for the comparison, and give both the same image";
+        sources.diagnostics.push(fault.with_help(help));
     }
 }
 

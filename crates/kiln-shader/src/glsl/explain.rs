@@ -38,6 +38,9 @@ pub fn of_stage(
 /// What to say of a call of a function that exists, but not for these arguments.
 fn unfit(stage: &Parsed, message: &str) -> Option<String> {
     let name = message.strip_prefix("unknown function `")?.strip_suffix('`')?;
+    if name == "kiln_equal" {
+        return Some("`==` does not take these types, or one is an array inside of a struct".to_owned());
+    }
     let name = name.strip_prefix("kiln_").unwrap_or(name);
     let is_own = |item: &Item| matches!(item, Item::Function(function) if function.name.is(name));
     let exists = builtin::FUNCTIONS.contains(&name) || stage.items.iter().any(is_own);

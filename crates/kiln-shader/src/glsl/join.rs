@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::source_map::Origins;
 use crate::token::{self, Kind, Token};
 
 /// A declaration of canonical WGSL.
@@ -11,6 +12,8 @@ struct Declaration {
     name: String,
     /// Its text.
     text: String,
+    /// Its stage, and its name there.
+    origin: (usize, String),
 }
 
 /// A name that two stages declare otherwise, although it is filled from outside.
@@ -18,11 +21,11 @@ struct Declaration {
 pub struct Clash(pub String);
 
 /// Joins the stages' texts, each with the ending for names that clash. `merged` are structs whose members
-/// are united.
-pub fn join(stages: &[(String, &str)], merged: &BTreeSet<&str>) -> Result<String, Clash> {
+/// are united. Says where each name comes from, too.
+pub fn join(stages: &[(String, &str)], merged: &BTreeSet<&str>) -> Result<(String, Origins), Clash> {
     let mut joined: Vec<Declaration> = Vec::new();
-    for (text, ending) in stages {
-        let mut added = split(text);
+    for (stage, (text, ending)) in stages.iter().enumerate() {
+        let mut added = split(stage, text);
         rename_clashes(&joined, &mut added, ending, merged)?;
         for declaration in added {
             match joined.iter_mut().find(|other| other.name == declaration.name) {
@@ -32,7 +35,9 @@ pub fn join(stages: &[(String, &str)], merged: &BTreeSet<&str>) -> Result<String
             }
         }
     }
-    Ok(joined.into_iter().map(|declaration| declaration.text + "\n").collect())
+    let origins = joined.iter().map(|declaration| (declaration.name.clone(), declaration.origin.clone()));
+    let origins = origins.collect();
+    Ok((joined.into_iter().map(|declaration| declaration.text + "\n").collect(), origins))
 }
 
 /// Renames until each name means the same in both; a declaration may differ only in a name it mentions, so
@@ -113,7 +118,7 @@ fn members(text: &str) -> Vec<(String, String)> {
 }
 
 /// Splits canonical text into its declarations.
-fn split(text: &str) -> Vec<Declaration> {
+fn split(stage: usize, text: &str) -> Vec<Declaration> {
     let tokens = token::tokenize(text).unwrap_or_default();
     let mut found = Vec::new();
     let (mut start, mut depth) = (0, 0_usize);
@@ -134,7 +139,7 @@ fn split(text: &str) -> Vec<Declaration> {
             let own = &tokens[start..=index];
             if let Some(name) = declared_name(text, own) {
                 let text = format!("{}\n", &text[own[0].start..token.end]);
-                found.push(Declaration { name, text });
+                found.push(Declaration { origin: (stage, name.clone()), name, text });
             }
             start = index + 1;
         }

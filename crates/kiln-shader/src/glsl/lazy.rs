@@ -1,12 +1,12 @@
-//! What naga evaluates too often. Both operands of `&&` and `||`, though the right one may not be reached: such
-//! a right operand with effects goes into `?:`, which naga keeps lazy. And the index of `a[f()] += b` twice.
+//! What naga evaluates too often: both operands of `&&` and `||`, though the right one may not be reached. Such a
+//! right operand with effects goes into `?:`, which naga keeps lazy.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use super::effects;
-use super::lex::{self, Kind, Token};
-use super::source::{Place, Sources};
+use super::lex::{Kind, Token};
+use super::source::Place;
 
 /// An operator whose right operand is not over.
 #[derive(Clone, Copy)]
@@ -74,7 +74,7 @@ impl Edits {
 }
 
 /// Rewrites a body or an initial value; `functions` have effects.
-pub fn lower(sources: &mut Sources<'_, '_>, functions: &BTreeSet<Rc<str>>, tokens: &[Token]) -> Vec<Token> {
+pub fn lower(functions: &BTreeSet<Rc<str>>, tokens: &[Token]) -> Vec<Token> {
     let mut edits = Edits::default();
     let mut frames = vec![Frame::new(0, 0)];
     for (at, token) in tokens.iter().enumerate() {
@@ -87,9 +87,6 @@ pub fn lower(sources: &mut Sources<'_, '_>, functions: &BTreeSet<Rc<str>>, token
                 let Some(frame) = frames.last_mut() else { return tokens.to_vec() };
                 if inner.has_effects {
                     frame.effect();
-                    if token.is("]") {
-                        check_index(sources, tokens, inner.bracket, at);
-                    }
                 }
                 let head = inner.bracket.checked_sub(1).map(|before| &*tokens[before].text);
                 if token.is("}") || matches!(head, Some("if" | "while" | "for" | "switch")) {
@@ -128,11 +125,13 @@ pub fn lower(sources: &mut Sources<'_, '_>, functions: &BTreeSet<Rc<str>>, token
     written(tokens, &edits)
 }
 
-fn is_assignment(text: &str) -> bool {
+/// Whether `text` assigns.
+pub fn is_assignment(text: &str) -> bool {
     text == "=" || is_compound(text)
 }
 
-fn is_compound(text: &str) -> bool {
+/// Whether `text` reads and writes its left operand.
+pub fn is_compound(text: &str) -> bool {
     matches!(text, "+=" | "-=" | "*=" | "/=" | "%=" | "&=" | "|=" | "^=" | "<<=" | ">>=")
 }
 
@@ -155,33 +154,4 @@ fn written(tokens: &[Token], edits: &Edits) -> Vec<Token> {
         out.extend(after.iter().map(|word| text(word, last.place)));
     }
     out
-}
-
-/// Reports `a[…] += b`, `a[…]++` and `++a[…]`, whose index has effects.
-fn check_index(sources: &mut Sources<'_, '_>, tokens: &[Token], open: usize, close: usize) {
-    let mut end = close + 1;
-    while let Some(token) = tokens.get(end) {
-        match &*token.text {
-            "." => end += 2,
-            "[" => end = lex::closing(tokens, end).map_or(tokens.len(), |close| close + 1),
-            _ => break,
-        }
-    }
-    let after = tokens.get(end).is_some_and(|next| is_compound(&next.text) || next.is("++") || next.is("--"));
-    let mut start = open;
-    while let Some(before) = start.checked_sub(1) {
-        match &*tokens[before].text {
-            "]" => start = lex::opening(tokens, before).unwrap_or(0),
-            "." => start = before,
-            _ if tokens[before].is_word() => start = before,
-            _ => break,
-        }
-    }
-    let before =
-        start.checked_sub(1).is_some_and(|before| tokens[before].is("++") || tokens[before].is("--"));
-    if after || before {
-        let place = tokens[open].place.to(tokens[close].place);
-        let fault = sources.error(place, "this index has an effect, and its element is read and written");
-        sources.diagnostics.push(fault.with_help("compute the index before, in a variable of its own"));
-    }
 }

@@ -8,16 +8,22 @@ use super::Parsed;
 use super::bindings::{self, Bindings};
 use super::builtin;
 use super::check;
-use super::declare::{self, Block, Function, Item, Variable};
+use super::declare::{self, Block, Function, Item, Qualifiers, Variable};
 use super::effects;
+use super::index;
+use super::initial;
+use super::layout::Moved;
 use super::lazy;
 use super::lex::{Kind, Token};
 use super::locations::{self, Interface, Passed};
 use super::order;
 use super::padding;
-use super::rewrite::{Meaning, Member, Rewriter, Scene, Stored};
+use super::rewrite::Rewriter;
+use super::scene::{self, Scene};
 use super::source::{Mapped, Place, Sources};
 use super::switch;
+use super::texture_array;
+use super::typed;
 use crate::Stage;
 use crate::names::{GROUPS, Group};
 
@@ -27,6 +33,15 @@ const VERSION: &str = "#version 460 core\n";
 /// The author's `main` where another one calls it: if there is work before or after, as it may return early.
 pub const AUTHORS_MAIN: &str = "kiln_main";
 
+/// A stage as naga reads it.
+#[derive(Debug)]
+pub struct Lowered {
+    /// Its text.
+    pub text: Mapped,
+    /// Members of its blocks that naga is to put elsewhere.
+    pub moved: Vec<Moved>,
+}
+
 /// Writes `stage`; what cannot be written is left in `sources`.
 pub fn lower(
     sources: &mut Sources<'_, '_>,
@@ -34,8 +49,8 @@ pub fn lower(
     interface: &Interface,
     bindings: &Bindings,
     holders: &BTreeMap<Group, String>,
-) -> Mapped {
-    let scene = scene(stage);
+) -> Lowered {
+    let scene = scene::scene(stage);
     let mut writer = Writer {
         sources,
         stage,
@@ -49,6 +64,7 @@ pub fn lower(
         runtime: BTreeSet::new(),
         padded: padding::padded_structs(stage),
         effects: effects::functions(stage),
+        moved: Vec::new(),
         prologue: Mapped::default(),
         epilogue: Mapped::default(),
     };
@@ -81,121 +97,12 @@ struct Writer<'a, 's, 'r> {
     padded: BTreeSet<Rc<str>>,
     /// Functions whose calls may not be left out or made twice.
     effects: BTreeSet<Rc<str>>,
+    /// Members that say where they lie.
+    moved: Vec<Moved>,
     /// What is done before the author's `main`.
     prologue: Mapped,
     /// What is done after it.
     epilogue: Mapped,
-}
-
-/// Names that are written otherwise, and what else a function's text means.
-fn scene(stage: &Parsed) -> Scene {
-    let mut scene = Scene {
-        stage: stage.stage,
-        meanings: BTreeMap::new(),
-        structs: BTreeSet::new(),
-        functions: BTreeSet::new(),
-        textured: BTreeSet::new(),
-        polyfills: BTreeMap::new(),
-        unsized_members: BTreeSet::new(),
-    };
-    for name in ["gl_VertexID", "gl_VertexIndex", "gl_InstanceID", "gl_InstanceIndex"] {
-        let texts = builtin::variable(name).unwrap_or_default().iter().map(|text| (*text).to_owned());
-        scene.meanings.insert(name.to_owned(), Meaning::Expression(texts.collect()));
-    }
-    let mut size = [1_u32; 3];
-    for item in &stage.items {
-        match item {
-            Item::Struct(structure) => drop(scene.structs.insert(Rc::clone(&structure.name.text))),
-            Item::Function(function) => {
-                scene.functions.insert(Rc::clone(&function.name.text));
-                let mut tokens = function.parameters.iter().flatten();
-                if tokens.any(|token| builtin::combined(&token.text).is_some()) {
-                    scene.textured.insert(Rc::clone(&function.name.text));
-                }
-            }
-            Item::Variable(variable) if variable.qualifiers.is("uniform") => {
-                let name = variable.name.text.to_string();
-                if let Some(combined) = builtin::combined(&variable.ty.text) {
-                    let sampler = bindings::sampler_name(variable, &combined);
-                    scene.meanings.insert(name, Meaning::Texture(combined, sampler));
-                } else if let (_, Some(stored)) = stored_type(variable) {
-                    scene.meanings.insert(name, Meaning::Stored(stored));
-                }
-            }
-            Item::Block(block) => {
-                block_meanings(&mut scene, stage, block);
-                let members = block.members.iter().filter(|member| member.is_unsized());
-                scene.unsized_members.extend(members.map(|member| Rc::clone(&member.name.text)));
-            }
-            Item::Qualifiers(qualifiers, _) => {
-                for (axis, name) in ["local_size_x", "local_size_y", "local_size_z"].iter().enumerate() {
-                    size[axis] = qualifiers.integer(name).unwrap_or(size[axis]);
-                }
-            }
-            _ => {}
-        }
-    }
-    let [x, y, z] = size.map(|count| format!("{count}u"));
-    let texts = ["uvec3", "(", &x, ",", &y, ",", &z, ")"].map(str::to_owned).to_vec();
-    scene.meanings.insert("gl_WorkGroupSize".to_owned(), Meaning::Expression(texts));
-    scene
-}
-
-fn block_meanings(scene: &mut Scene, stage: &Parsed, block: &Block) {
-    let is_passed = locations::direction(&block.qualifiers, stage.stage).is_some();
-    let is_uniform = block.qualifiers.is("uniform");
-    let is_flat = block.is_flattened();
-    let mut members = BTreeMap::new();
-    for member in &block.members {
-        let name = member.name.text.to_string();
-        if is_passed || is_flat {
-            members.insert(name, Member::Renamed(locations::member_name(&block.name, &member.name)));
-        } else if let (_, Some(stored)) = stored_type(member)
-            && is_uniform
-        {
-            if block.instance.is_none() {
-                scene.meanings.insert(name, Meaning::Stored(stored));
-            } else {
-                members.insert(name, Member::Stored(stored));
-            }
-        }
-    }
-    if let Some(instance) = &block.instance
-        && !members.is_empty()
-    {
-        scene.meanings.insert(instance.text.to_string(), Meaning::Instance(members));
-    }
-}
-
-/// The type that a uniform is stored as, and how its uses are written if that is another.
-fn stored_type(variable: &Variable) -> (String, Option<Stored>) {
-    let ty = &*variable.ty.text;
-    let is_array = !variable.array.is_empty();
-    let len =
-        builtin::vector_len(ty).or_else(|| matches!(ty, "float" | "int" | "uint" | "bool").then_some(1));
-    let Some(len) = len else { return (ty.to_owned(), None) };
-    let is_flag = ty.starts_with('b');
-    let kind = match ty.as_bytes().first() {
-        Some(b'b' | b'u') => "u",
-        Some(b'i') => "i",
-        _ => "",
-    };
-    let swizzle = match len {
-        1 => Some("x"),
-        2 => Some("xy"),
-        3 if is_flag => Some("xyz"),
-        _ => None,
-    };
-    let stored = Stored { swizzle: swizzle.filter(|_| is_array), flags: is_flag.then_some(len) };
-    if stored == Stored::default() {
-        return (ty.to_owned(), None);
-    }
-    let stored_len = if is_array { 4 } else { len };
-    let name = match (stored_len, kind) {
-        (1, _) => "uint".to_owned(),
-        (len, kind) => format!("{kind}vec{len}"),
-    };
-    (name, Some(stored))
 }
 
 /// Appends tokens with space between.
@@ -232,7 +139,7 @@ impl Writer<'_, '_, '_> {
             Item::Variable(variable) => self.variable(variable),
             Item::Block(block) => self.block(block),
             Item::Qualifiers(qualifiers, names) => {
-                check::layouts(self.sources, qualifiers);
+                check::default_layouts(self.sources, qualifiers);
                 check::packing(self.sources, self.stage, qualifiers, None);
                 let place = qualifiers.layout.first().map(|layout| layout.name.place);
                 let place = place.or(names.first().map(|name| name.place));
@@ -299,7 +206,8 @@ impl Writer<'_, '_, '_> {
             let message = format!("`{}` is initialised with a list", variable.name.text);
             return self.report(initial[0].place, message, "write a constructor, as in `float[2](1.0, 2.0)`");
         }
-        let initial = lazy::lower(self.sources, &self.effects, initial);
+        index::check(self.sources, &self.effects, initial);
+        let initial = lazy::lower(&self.effects, initial);
         let value = Rewriter::new(self.sources, &mut self.scene, None).tokens(&initial);
         let mark = |text: &str| Token::new(Kind::Mark, text, variable.place());
         let assignment = [variable.name.clone(), mark("=")].into_iter().chain(value).chain([mark(";")]);
@@ -323,10 +231,10 @@ impl Writer<'_, '_, '_> {
 
     fn constant(&mut self, variable: &Variable) {
         let initial = variable.initial.clone().unwrap_or_default();
-        let is_runtime = initial.windows(2).any(|pair| {
+        let is_runtime = initial.windows(2).enumerate().any(|(at, pair)| {
             let name = &pair[0];
             let is_type = builtin::is_value_type(&name.text) || self.scene.structs.contains(&name.text);
-            name.is_word() && pair[1].is("(") && !is_type
+            name.is_word() && pair[1].is("(") && (!is_type || typed::is_matrix_of_one(&initial, at))
         }) || initial.iter().any(|token| self.runtime.contains(&token.text));
         if is_runtime && variable.qualifiers.layout.is_empty() {
             self.runtime.insert(Rc::clone(&variable.name.text));
@@ -360,9 +268,10 @@ impl Writer<'_, '_, '_> {
             }
             return self.opaque(variable);
         }
-        if let Some(initial) = variable.initial.as_ref().and_then(|initial| initial.first()) {
+        let initial = variable.initial.as_ref().and_then(|initial| initial.first());
+        if let Some(initial) = initial.filter(|_| initial::value(variable).is_none()) {
             let message = format!("the initial value of `{name}` is not kept");
-            let help = "WGSL has no initial values of uniforms: set it from outside, or make it a `const`";
+            let help = "a number or vector of literals is kept, unless Kiln fills the uniform by its name; or make it a `const`";
             let warning = self.sources.warning(initial.place, message).with_help(help);
             self.sources.diagnostics.push(warning);
         }
@@ -389,6 +298,7 @@ impl Writer<'_, '_, '_> {
             let format = variable.qualifiers.layout.iter().find(|layout| check::is_format(&layout.name.text));
             let format = format.map_or(String::new(), |format| format!("{}, ", format.name.text));
             check::image_format(self.sources, variable);
+            check::comparison(self.sources, self.stage, variable);
             let access = check::image_access(self.sources, self.stage, variable);
             self.globals.push(&format!("layout({format}{layout}) {access} uniform "), place);
             put(&mut self.globals, &[variable.ty.clone(), variable.name.clone()]);
@@ -396,7 +306,7 @@ impl Writer<'_, '_, '_> {
         };
         let text = format!("layout({layout}) uniform {} {name};\n", combined.texture);
         self.globals.push(&text, place);
-        let sampler = bindings::sampler_name(variable, &combined);
+        let sampler = bindings::sampler_name(&variable.name.text, &combined);
         if self.samplers.insert(sampler.clone()) {
             let layout = self.layout(&sampler);
             let text = format!("layout({layout}) uniform {} {sampler};\n", combined.sampler);
@@ -406,11 +316,7 @@ impl Writer<'_, '_, '_> {
 
     fn block(&mut self, block: &Block) {
         let place = block.name.place;
-        check::layouts(self.sources, &block.qualifiers);
-        let is_pushed = block.qualifiers.layout("push_constant").is_some();
-        for member in &block.members {
-            check::member_layouts(self.sources, &member.qualifiers, is_pushed);
-        }
+        check::block_layouts(self.sources, self.stage, block);
         if locations::direction(&block.qualifiers, self.stage.stage).is_some() {
             return;
         }
@@ -439,6 +345,10 @@ impl Writer<'_, '_, '_> {
             if block.is_flattened() {
                 member.name.text = Rc::from(locations::member_name(&block.name, &member.name));
             }
+            self.note_layout(block, &member);
+            if scene::is_row_major(self.stage, block, &member) {
+                member.ty.text = scene::turned(&member.ty.text).map_or(member.ty.text, Rc::from);
+            }
             self.member(&member, is_uniform);
         }
         self.globals.push("};\n", place);
@@ -449,8 +359,34 @@ impl Writer<'_, '_, '_> {
         }
     }
 
+    /// Notes where a member says that it lies. Push constants become a uniform that is filled by name: stages share one
+    /// block by giving each its part, and where that lies does not matter.
+    fn note_layout(&mut self, block: &Block, member: &Variable) {
+        if block.qualifiers.layout("push_constant").is_some() {
+            return;
+        }
+        let mut said = |name: &str, qualifiers: &Qualifiers| {
+            let layout = qualifiers.layout(name)?;
+            let value = texture_array::value(&layout.value, &self.scene.constants);
+            let value = value.and_then(|value| u32::try_from(value).ok());
+            if value.is_none() {
+                let fault = self.sources.error(layout.name.place, format!("`{name}` is no constant"));
+                self.sources
+                    .diagnostics
+                    .push(fault.with_help("write a literal, or a `const int` that is one"));
+            }
+            value
+        };
+        let offset = said("offset", &member.qualifiers);
+        let align = said("align", &member.qualifiers).or_else(|| said("align", &block.qualifiers));
+        if offset.is_some() || align.is_some() {
+            let [block, member] = [&block.name, &member.name].map(|name| name.text.to_string());
+            self.moved.push(Moved { block, member, offset, align });
+        }
+    }
+
     fn member(&mut self, member: &Variable, is_uniform: bool) {
-        let ty = if is_uniform { stored_type(member).0 } else { member.ty.text.to_string() };
+        let ty = if is_uniform { scene::stored_type(member).0 } else { member.ty.text.to_string() };
         let ty = Token::new(Kind::Word, ty, member.ty.place);
         put(&mut self.globals, &[vec![ty, member.name.clone()], declare::reversed(&member.array)].concat());
         self.globals.push(";\n", member.name.place);
@@ -531,7 +467,8 @@ impl Writer<'_, '_, '_> {
         let mut rewriter = Rewriter::new(self.sources, &mut self.scene, returned);
         let parameters: Vec<Vec<Token>> =
             function.parameters.iter().map(|parameter| rewriter.parameter(parameter)).collect();
-        let body = function.body.as_ref().map(|body| lazy::lower(rewriter.sources, &self.effects, body));
+        let body = function.body.as_ref().map(|body| index::lower(rewriter.sources, &self.effects, body));
+        let body = body.map(|body| lazy::lower(&self.effects, &body));
         let body = body.map(|body| switch::without_fall_through(rewriter.sources, &body));
         let body = body.map(|body| rewriter.tokens(&body));
         put(&mut self.functions, &result);
@@ -557,7 +494,7 @@ impl Writer<'_, '_, '_> {
         !(self.prologue.text.is_empty() && self.epilogue.text.is_empty())
     }
 
-    fn finish(self) -> Mapped {
+    fn finish(self) -> Lowered {
         let start = Place { file: self.stage.root, start: 0, end: 0 };
         let mut text = Mapped::default();
         text.push(VERSION, start);
@@ -567,6 +504,9 @@ impl Writer<'_, '_, '_> {
         for (name, place) in self.scene.polyfills {
             text.push(&builtin::polyfill(name).unwrap_or_default(), place);
         }
+        for helper in &self.scene.helpers {
+            text.push(&helper.text, helper.place);
+        }
         text.append(self.functions);
         if wraps_main {
             text.push("void main() {\n", start);
@@ -575,7 +515,7 @@ impl Writer<'_, '_, '_> {
             text.append(self.epilogue);
             text.push("}\n", start);
         }
-        text
+        Lowered { text, moved: self.moved }
     }
 }
 

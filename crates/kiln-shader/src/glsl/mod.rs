@@ -18,7 +18,7 @@ use kiln_diagnostic::Diagnostic;
 
 use crate::link::Read;
 use crate::lint::{Allowances, Warning};
-use crate::{Compiled, Outcome, Program, Scan, Stage, front, limits, parameter};
+use crate::{Compiled, Outcome, Program, Scan, SourceMap, Stage, front, limits, parameter};
 use declare::Item;
 use lex::Token;
 use source::Sources;
@@ -34,8 +34,11 @@ mod effects;
 mod explain;
 mod extension;
 mod include;
+mod index;
+mod initial;
 mod inout;
 mod join;
+mod layout;
 mod lazy;
 mod lex;
 mod locations;
@@ -46,11 +49,18 @@ mod order;
 mod padding;
 mod preprocess;
 mod rewrite;
+mod scene;
 mod source;
+mod source_map;
 mod stage;
 mod stage_module;
 mod statement;
+mod stride;
 mod switch;
+mod texture;
+mod texture_array;
+mod typed;
+mod types;
 
 /// A stage after preprocessing.
 #[derive(Debug)]
@@ -61,6 +71,8 @@ struct Parsed {
     tokens: Vec<Token>,
     items: Vec<Item>,
     counts: BTreeMap<Rc<str>, usize>,
+    /// How many textures each array of them has; the items hold its elements.
+    texture_arrays: BTreeMap<Rc<str>, usize>,
 }
 
 impl Parsed {
@@ -70,7 +82,7 @@ impl Parsed {
             *counts.entry(Rc::clone(&token.text)).or_insert(0) += 1;
         }
         let items = declare::parse(&tokens);
-        Parsed { stage, root, tokens, items, counts }
+        Parsed { stage, root, tokens, items, counts, texture_arrays: BTreeMap::new() }
     }
 
     /// How often a word stands in the stage.
@@ -85,9 +97,12 @@ pub fn compile(program: &Program, features: &BTreeSet<String>, lints: bool, read
     let mut sources = Sources::new(read);
     let mut named = BTreeSet::new();
     let stages = load(&mut sources, program, features, &mut named);
-    let mut compiled = if has_errors(&sources) { None } else { translate(&mut sources, &stages, lints) };
-    if let Some(compiled) = &mut compiled {
-        let annotations = annotations(&mut sources);
+    let mut translated = if has_errors(&sources) { None } else { translate(&mut sources, &stages, lints) };
+    if let Some((compiled, _)) = &mut translated {
+        let mut annotations = annotations(&mut sources);
+        for (variable, value) in initial::values(&stages) {
+            parameter::give_first(&mut annotations, &variable.name.text, variable.ty.is("bool"), value);
+        }
         compiled.reflection.parameters = parameter::parameters(&compiled.reflection, annotations);
     }
     let Sources { dependencies, diagnostics: found, .. } = sources;
@@ -98,7 +113,9 @@ pub fn compile(program: &Program, features: &BTreeSet<String>, lints: bool, read
             diagnostics.push(diagnostic);
         }
     }
-    Outcome { compiled, diagnostics, dependencies, features: named, ..Outcome::default() }
+    let (compiled, source_map) = translated.unzip();
+    let source_map = source_map.unwrap_or_default();
+    Outcome { compiled, source_map, diagnostics, dependencies, features: named, is_library: false }
 }
 
 /// Each file's, though it may be included more than once.
@@ -163,7 +180,8 @@ fn load(
         }
         let tokens = preprocessed.tokens;
         if nesting::check_characters(sources, &tokens) && nesting::check_nesting(sources, &tokens) {
-            let parsed = Parsed::new(stage, root, tokens);
+            let mut parsed = Parsed::new(stage, root, tokens);
+            texture_array::expand(sources, &mut parsed);
             if nesting::check_count(sources, &parsed) {
                 stages.push(parsed);
             }
@@ -201,13 +219,13 @@ fn stage_of(sources: &mut Sources<'_, '_>, path: &str, pragma: Option<&Token>) -
 }
 
 /// Everything after preprocessing.
-fn translate(sources: &mut Sources<'_, '_>, stages: &[Parsed], lints: bool) -> Option<Compiled> {
+fn translate(sources: &mut Sources<'_, '_>, stages: &[Parsed], lints: bool) -> Option<(Compiled, SourceMap)> {
     check_main(sources, stages);
     bindings::check_equal(sources, stages);
     let interfaces = locations::assign(sources, stages);
     let bound = bindings::assign(sources, stages);
     let holders = lower::holder_names(stages);
-    let texts: Vec<source::Mapped> = stages
+    let texts: Vec<lower::Lowered> = stages
         .iter()
         .zip(&interfaces)
         .map(|(stage, interface)| lower::lower(sources, stage, interface, &bound, &holders))
@@ -216,19 +234,21 @@ fn translate(sources: &mut Sources<'_, '_>, stages: &[Parsed], lints: bool) -> O
         return None;
     }
     let names: BTreeMap<(u32, u32), String> = bound.of.iter().map(|(name, at)| (*at, name.clone())).collect();
-    let mut written = Vec::new();
+    let (mut written, mut functions) = (Vec::new(), Vec::new());
     let mut diagnostics = Vec::new();
     let files = sources.files.iter().map(|file| (file.path.as_str(), &*file.text));
     let allowances = if lints { Allowances::read(files, &mut diagnostics) } else { Allowances::default() };
     sources.diagnostics.append(&mut diagnostics);
-    for (stage, text) in stages.iter().zip(&texts) {
-        let found: Vec<Diagnostic> = match stage_module::translate(&text.text, stage.stage, &names, lints) {
-            Ok(Ok((wgsl, warnings))) => {
-                written.push((wgsl, stage::ending(stage.stage)));
+    for (stage, lowered) in stages.iter().zip(&texts) {
+        let text = &lowered.text;
+        let found: Vec<Diagnostic> = match stage_module::translate(lowered, stage.stage, &names, lints) {
+            Ok(Ok(translated)) => {
+                written.push((translated.wgsl, stage::ending(stage.stage)));
+                functions.push(translated.functions);
                 let warn = |Warning { rule, finding, help }| {
                     allowances.warn(explain::of_stage(sources, stage, text, finding), rule, &help)
                 };
-                warnings.into_iter().take(limits::WARNINGS_MAX).filter_map(warn).collect()
+                translated.warnings.into_iter().take(limits::WARNINGS_MAX).filter_map(warn).collect()
             }
             Ok(Err(findings)) => {
                 findings.into_iter().map(|finding| explain::of_stage(sources, stage, text, finding)).collect()
@@ -241,20 +261,32 @@ fn translate(sources: &mut Sources<'_, '_>, stages: &[Parsed], lints: bool) -> O
         return None;
     }
     let merged = holders.values().map(String::as_str).collect();
-    link(sources, stages, &interfaces, &written, &bound, &merged)
+    let (joined, origins) = join(sources, stages, &written, &merged)?;
+    let name_locals = |module: &mut naga::Module| source_map::name_locals(module, &origins, &functions);
+    match front::compile_joined(&joined, name_locals) {
+        Ok((mut compiled, canonical)) => {
+            restore_names(&mut compiled, stages, &interfaces);
+            let map = source_map::place(sources, stages, &texts, (&origins, &functions), canonical);
+            Some((compiled, map))
+        }
+        Err(fault) => {
+            let root = stages.first()?.root;
+            let diagnostic = explain::of_program(sources, &bound, &joined, root, fault);
+            sources.diagnostics.push(diagnostic);
+            None
+        }
+    }
 }
 
-fn link(
+/// Joins the stages; what keeps them apart is left in `sources`.
+fn join(
     sources: &mut Sources<'_, '_>,
     stages: &[Parsed],
-    interfaces: &[locations::Interface],
     written: &[(String, &str)],
-    bound: &bindings::Bindings,
     holders: &BTreeSet<&str>,
-) -> Option<Compiled> {
-    let root = stages.first()?.root;
-    let joined = match join::join(written, holders) {
-        Ok(joined) => joined,
+) -> Option<(String, source_map::Origins)> {
+    match join::join(written, holders) {
+        Ok(joined) => Some(joined),
         Err(join::Clash(name)) => {
             let message = format!("`{name}` differs between the stages");
             let places = bindings::places_of(stages, &name);
@@ -265,21 +297,10 @@ fn link(
                     diagnostic.notes.insert(0, note);
                     diagnostic
                 }
-                _ => Diagnostic::error(message).in_file(&sources.files[root].path),
+                _ => Diagnostic::error(message).in_file(&sources.files[stages.first()?.root].path),
             };
             let help = "declare it alike in all stages, best in one included file";
             sources.diagnostics.push(diagnostic.with_help(help));
-            return None;
-        }
-    };
-    match front::compile_joined(&joined) {
-        Ok(mut compiled) => {
-            restore_names(&mut compiled, stages, interfaces);
-            Some(compiled)
-        }
-        Err(fault) => {
-            let diagnostic = explain::of_program(sources, bound, &joined, root, fault);
-            sources.diagnostics.push(diagnostic);
             None
         }
     }

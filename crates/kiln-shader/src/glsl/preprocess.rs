@@ -142,7 +142,7 @@ impl Preprocessor<'_, '_, '_> {
                 return self.error(Place { file: index, start: at, end: at + 2 }, "`/*` is never closed");
             }
         };
-        self.note_features(&tokens);
+        self.out.features.extend(features_in(&tokens));
         let starts = text.match_indices('\n').map(|(at, _)| at + 1);
         self.macros.line_starts.insert(index, std::iter::once(0).chain(starts).collect());
         self.stack.push(path);
@@ -167,11 +167,6 @@ impl Preprocessor<'_, '_, '_> {
             self.error(open.place, "this condition has no `#endif`");
         }
         self.stack.pop();
-    }
-
-    fn note_features(&mut self, tokens: &[Token]) {
-        let names = tokens.iter().filter_map(|token| token.text.strip_prefix(FEATURE_PREFIX));
-        self.out.features.extend(names.filter(|name| !name.is_empty()).map(str::to_ascii_lowercase));
     }
 
     fn is_active(&self) -> bool {
@@ -498,11 +493,27 @@ fn upper(name: &str) -> String {
     name.to_ascii_uppercase()
 }
 
-/// Features that the text of `file` names anywhere.
+/// Features that the text of `file` names under any condition.
 pub fn named_features(file: usize, text: &str) -> BTreeSet<String> {
-    let tokens = lex::tokenize(file, text).unwrap_or_default();
-    let names = tokens.iter().filter_map(|token| token.text.strip_prefix(FEATURE_PREFIX));
-    names.filter(|name| !name.is_empty()).map(str::to_ascii_lowercase).collect()
+    features_in(&lex::tokenize(file, text).unwrap_or_default())
+}
+
+/// Features that conditions name, or macros that conditions may use. Elsewhere the author may call what he likes so.
+fn features_in(tokens: &[Token]) -> BTreeSet<String> {
+    let mut found = BTreeSet::new();
+    for line in tokens.chunk_by(|_, next| !next.starts_line) {
+        let words = match line {
+            [hash, word, rest @ ..] if hash.is("#") => match &*word.text {
+                "if" | "elif" | "ifdef" | "ifndef" => rest,
+                "define" => rest.get(1..).unwrap_or_default(),
+                _ => continue,
+            },
+            _ => continue,
+        };
+        let names = words.iter().filter_map(|token| token.text.strip_prefix(FEATURE_PREFIX));
+        found.extend(names.filter(|name| !name.is_empty()).map(str::to_ascii_lowercase));
+    }
+    found
 }
 
 /// Names of files that the text of `file` includes under any condition, with how they are spelled.

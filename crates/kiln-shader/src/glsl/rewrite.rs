@@ -1,96 +1,57 @@
 //! Rewrites expressions and statements to what naga reads. One pass over the tokens of a function, with the
 //! scopes of local names, because a local may hide what would be rewritten.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use kiln_diagnostic::Diagnostic;
 
 use super::builtin::{self, Combined};
 use super::declare::{self, DROPPED};
+use super::lazy;
 use super::lex::{self, Kind, Token};
+use super::scene::{Meaning, Member, Scene, Stored};
 use super::source::{Place, Sources};
 use super::statement;
+use super::texture::Parts;
+use super::types::Type;
 use crate::Stage;
-
-/// How the use of a global name is written for naga.
-#[derive(Clone, Debug)]
-pub enum Meaning {
-    /// A combined texture: both parts, by the name of its sampler.
-    Texture(Combined, String),
-    /// A uniform that is stored as another type.
-    Stored(Stored),
-    /// The instance of a block, with members that are written otherwise.
-    Instance(BTreeMap<String, Member>),
-    /// Another expression.
-    Expression(Vec<String>),
-}
-
-/// How the use of a block's member is written.
-#[derive(Clone, Debug)]
-pub enum Member {
-    /// A variable of its own.
-    Renamed(String),
-    /// Stored as another type.
-    Stored(Stored),
-}
-
-/// A uniform that cannot be stored as what it is: truth values, and arrays of less than four components.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Stored {
-    /// The components that are used of each array element.
-    pub swizzle: Option<&'static str>,
-    /// How many truth values are stored as numbers.
-    pub flags: Option<u32>,
-}
-
-/// What a stage knows while its functions are rewritten.
-#[derive(Debug)]
-pub struct Scene {
-    /// The stage.
-    pub stage: Stage,
-    /// Global names that are written otherwise.
-    pub meanings: BTreeMap<String, Meaning>,
-    /// Names of structs.
-    pub structs: BTreeSet<Rc<str>>,
-    /// Names of functions.
-    pub functions: BTreeSet<Rc<str>>,
-    /// Those that take a combined texture.
-    pub textured: BTreeSet<Rc<str>>,
-    /// Members of buffers that are arrays without a length.
-    pub unsized_members: BTreeSet<Rc<str>>,
-    /// Functions to define, with the place of their first use.
-    pub polyfills: BTreeMap<&'static str, Place>,
-}
 
 /// What a local name is.
 #[derive(Clone, Debug)]
-enum Local {
-    Plain,
+pub(super) enum Local {
+    /// A value of some type.
+    Value(Type),
+    /// A combined texture, with the name of its sampler.
     Texture(Combined, String),
+    /// An array of them.
+    Textures(Combined, Vec<Parts>),
 }
 
 /// Rewrites a function's parameters and body, or an initialiser: `result` is the type it gives.
 pub struct Rewriter<'a, 's, 'r> {
     /// Where faults are left.
     pub sources: &'a mut Sources<'s, 'r>,
-    scene: &'a mut Scene,
+    pub(super) scene: &'a mut Scene,
     scopes: Vec<BTreeMap<Rc<str>, Local>>,
     /// Locals whose name holds from some token on.
-    pending: BTreeMap<usize, Vec<Rc<str>>>,
+    pending: BTreeMap<usize, Vec<(Rc<str>, Type)>>,
     /// Index after a `for` statement, where its scope ends.
     loops: Vec<usize>,
     /// What is called by each open parenthesis.
-    calls: Vec<Option<Rc<str>>>,
+    pub(super) calls: Vec<Option<Rc<str>>>,
     /// Text before a token.
     before: BTreeMap<usize, Vec<Token>>,
     /// Text in place of a token.
-    instead: BTreeMap<usize, Vec<Token>>,
+    pub(super) instead: BTreeMap<usize, Vec<Token>>,
     result: Option<Rc<str>>,
-    out: Vec<Token>,
+    pub(super) out: Vec<Token>,
+    /// Where in `out` each token begins.
+    pub(super) written: Vec<usize>,
 }
 
-fn tokens_of(texts: &[&str], place: Place) -> Vec<Token> {
+/// Tokens that Kiln writes, on behalf of `place`.
+pub(super) fn tokens_of(texts: &[&str], place: Place) -> Vec<Token> {
     texts.iter().map(|text| Token::new(kind_of(text), *text, place)).collect()
 }
 
@@ -116,10 +77,11 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
             instead: BTreeMap::new(),
             result,
             out: Vec::new(),
+            written: Vec::new(),
         }
     }
 
-    fn report(&mut self, place: Place, message: impl Into<String>, help: impl Into<String>) {
+    pub(super) fn report(&mut self, place: Place, message: impl Into<String>, help: impl Into<String>) {
         let diagnostic: Diagnostic = self.sources.error(place, message).with_help(help);
         self.sources.diagnostics.push(diagnostic);
     }
@@ -140,40 +102,31 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
         };
         let rest = &kept[at + 1..];
         let name = rest.get(declare::array_len(rest)).filter(|name| name.is_word());
-        let combined = builtin::combined(&kept[at].text);
+        if let Some(combined) = builtin::combined(&kept[at].text) {
+            return self.texture_parameter(&kept, at, &combined);
+        }
+        let of_type = declare::array_len(rest);
+        let end = rest.len().min(of_type + 1);
         if let Some(name) = name {
-            let local = match &combined {
-                Some(combined) => Local::Texture(combined.clone(), format!("{}_sampler", name.text)),
-                None => Local::Plain,
-            };
-            self.declare(&name.text, local);
+            let ty = Type::new(&kept[at].text, &[&rest[end..], &rest[..of_type]].concat());
+            self.declare(&name.text, Local::Value(ty));
         }
-        let Some(combined) = combined else {
-            let of_type = declare::array_len(rest);
-            let end = rest.len().min(of_type + 1);
-            let arrays = (declare::reversed(&rest[..of_type]), declare::reversed(&rest[end..]));
-            return [&kept[..=at], &arrays.0, &rest[of_type..end], &arrays.1].concat();
-        };
-        let ty = &kept[at];
-        if rest.iter().any(|token| token.is("[")) {
-            self.report(
-                ty.place,
-                "arrays of textures are not supported",
-                "pass each texture by itself, or use a texture array",
-            );
-        }
-        let (name, place) = (name.map_or("unused", |name| &*name.text), name.unwrap_or(ty).place);
-        let sampler = format!("{name}_sampler");
-        tokens_of(&[&combined.texture, name, ",", combined.sampler, &sampler], place)
+        let arrays = (declare::reversed(&rest[..of_type]), declare::reversed(&rest[end..]));
+        [&kept[..=at], &arrays.0, &rest[of_type..end], &arrays.1].concat()
     }
 
-    fn declare(&mut self, name: &Rc<str>, local: Local) {
+    /// Adds text before token `at`, after what is written there. What is inner was opened later and closes first.
+    pub(super) fn close(&mut self, at: usize, texts: &[&str], place: Place) {
+        self.before.entry(at).or_default().splice(0..0, tokens_of(texts, place));
+    }
+
+    pub(super) fn declare(&mut self, name: &Rc<str>, local: Local) {
         if let Some(scope) = self.scopes.last_mut() {
             scope.insert(Rc::clone(name), local);
         }
     }
 
-    fn local(&self, name: &str) -> Option<&Local> {
+    pub(super) fn local(&self, name: &str) -> Option<&Local> {
         self.scopes.iter().rev().find_map(|scope| scope.get(name))
     }
 
@@ -186,12 +139,13 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
                 }
                 *end > at
             });
-            for name in self.pending.remove(&at).unwrap_or_default() {
-                self.declare(&name, Local::Plain);
+            for (name, ty) in self.pending.remove(&at).unwrap_or_default() {
+                self.declare(&name, Local::Value(ty));
             }
             if let Some(before) = self.before.remove(&at) {
                 self.out.extend(before);
             }
+            self.written.push(self.out.len());
             match self.instead.remove(&at) {
                 Some(instead) => self.out.extend(instead),
                 None => self.token(tokens, at),
@@ -223,6 +177,9 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
                     format!("write `{single}`: there are no doubles in WGSL"),
                 );
             }
+            (".", _) if self.column_component(tokens, at) => return,
+            ("==" | "!=", _) if self.comparison(tokens, at) => return,
+            (text, _) if lazy::is_assignment(text) && self.column_assignment(tokens, at) => return,
             (_, Kind::Word) => return self.word(tokens, at),
             _ => {}
         }
@@ -235,14 +192,6 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
         let is_call = tokens.get(at + 1).is_some_and(|next| next.is("("));
         let text = &*token.text;
         if after_dot {
-            let array = at.checked_sub(2).map(|array| &tokens[array]);
-            if text == "length"
-                && is_call
-                && let Some(array) = array.filter(|array| self.scene.unsized_members.contains(&array.text))
-            {
-                let message = format!("the length of the buffer array `{}` is not supported", array.text);
-                self.report(array.place.to(token.place), message, "pass the count in a uniform");
-            }
             self.out.push(token.clone());
             return;
         }
@@ -262,6 +211,8 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
         }
         if self.is_declaration(tokens, at) {
             self.declaration(tokens, at);
+        } else if let Some(call) = self.matrix_of_vector(tokens, at) {
+            return self.out.push(call);
         } else if self.is_type(text) {
             // A constructor of an array.
             self.reverse(tokens, at + 1);
@@ -277,14 +228,16 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
     fn rewritten(&mut self, tokens: &[Token], at: usize, is_call: bool) -> bool {
         let token = &tokens[at];
         if let Some(local) = self.local(&token.text).cloned() {
-            if let Local::Texture(combined, sampler) = local {
-                self.texture(tokens, at, &combined, &sampler);
-                return true;
+            match local {
+                Local::Texture(combined, sampler) => self.texture(tokens, at, &combined, &sampler),
+                Local::Textures(combined, elements) => self.textures(tokens, at, &combined, &elements),
+                Local::Value(_) => return false,
             }
-            return false;
+            return true;
         }
         match self.scene.meanings.get(&*token.text).cloned() {
             Some(Meaning::Texture(combined, sampler)) => self.texture(tokens, at, &combined, &sampler),
+            Some(Meaning::Textures(combined, elements)) => self.textures(tokens, at, &combined, &elements),
             Some(Meaning::Stored(stored)) => self.stored(tokens, at, at, stored),
             Some(Meaning::Instance(members)) => return self.instance(tokens, at, &members),
             Some(Meaning::Expression(texts)) => {
@@ -314,59 +267,33 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
         }
     }
 
-    /// A combined texture: both parts for a function of the author's, joined for GLSL's own.
-    fn texture(&mut self, tokens: &[Token], at: usize, combined: &Combined, sampler: &str) {
-        let (token, place) = (&tokens[at], tokens[at].place);
-        let is_argument =
-            at.checked_sub(1).is_some_and(|before| ["(", ","].iter().any(|mark| tokens[before].is(mark)))
-                && tokens.get(at + 1).is_some_and(|next| [")", ","].iter().any(|mark| next.is(mark)));
-        let callee = self.calls.last().cloned().flatten().filter(|_| is_argument);
-        match callee {
-            None if tokens.get(at + 1).is_some_and(|next| next.is("[")) => {
-                self.report(
-                    place,
-                    format!("`{}` is no array", token.text),
-                    "arrays of textures are not supported",
-                );
-            }
-            None => self.report(
-                place,
-                format!("the texture `{}` has no value", token.text),
-                "pass it to a function, as in `texture(name, uv)`",
-            ),
-            Some(callee) if self.scene.textured.contains(&callee) => {
-                self.out.extend(tokens_of(&[&token.text, ",", sampler], place));
-            }
-            Some(_) => {
-                let texts = [&*combined.constructor, "(", &token.text, ",", sampler, ")"];
-                self.out.extend(tokens_of(&texts, place));
-            }
-        }
-    }
-
     /// A uniform whose name ends at token `last`, and which is stored as another type.
     fn stored(&mut self, tokens: &[Token], first: usize, last: usize, stored: Stored) {
         let place = tokens[first].place.to(tokens[last].place);
         let mut end = last + 1;
-        if tokens.get(end).is_some_and(|next| next.is("[")) {
+        let is_array = stored.swizzle.is_some() || stored.rows == Some(true);
+        if stored.rows != Some(false) && tokens.get(end).is_some_and(|next| next.is("[")) {
             end = lex::closing(tokens, end).map_or(end, |close| close + 1);
-        } else if stored.swizzle.is_some() && !tokens.get(end).is_some_and(|next| next.is(".")) {
-            self.report(
-                place,
-                format!("the array `{}` cannot be used as a whole", tokens[last].text),
-                "use its elements, or declare it as an array of `vec4`",
-            );
+        } else if is_array && !tokens.get(end).is_some_and(|next| next.is(".")) {
+            let help = match stored.rows {
+                Some(_) => "use its elements, or leave `row_major` out",
+                None => "use its elements, or declare it as an array of `vec4`",
+            };
+            let name = &tokens[last].text;
+            self.report(place, format!("the array `{name}` cannot be used as a whole"), help);
         }
         let name: Vec<Token> = tokens[first..=last].to_vec();
         let swizzle = stored.swizzle.map(|swizzle| tokens_of(&[".", swizzle], place)).unwrap_or_default();
         let after = match stored.flags {
             Some(1) => tokens_of(&["!=", "0u", ")"], place),
             Some(count) => tokens_of(&[",", &format!("uvec{count}"), "(", "0u", ")", ")"], place),
+            None if stored.rows.is_some() => tokens_of(&[")"], place),
             None => Vec::new(),
         };
         match stored.flags {
             Some(1) => self.out.extend(tokens_of(&["("], place)),
             Some(_) => self.out.extend(tokens_of(&["notEqual", "("], place)),
+            None if stored.rows.is_some() => self.out.extend(tokens_of(&["transpose", "("], place)),
             None => {}
         }
         self.out.extend(name);
@@ -442,6 +369,9 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
             self.scene.polyfills.entry(function).or_insert(token.place);
             name.insert_str(0, "kiln_");
         }
+        if let Some(selected) = self.selected(tokens, &name, at + 2, close) {
+            name = selected;
+        }
         let mut call = token.clone();
         call.text = Rc::from(name);
         // The parenthesis that follows belongs to the written name.
@@ -472,7 +402,10 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
             self.reverse(tokens, name + 1);
             let end = statement::declarator_end(tokens, name);
             self.instead.insert(name, vec![tokens[name].clone()]);
-            self.pending.entry(end).or_default().push(Rc::clone(&tokens[name].text));
+            let of_name = &tokens[name + 1..][..declare::array_len(&tokens[name + 1..])];
+            let array = [of_name, &tokens[at + 1..][..type_array]].concat();
+            let declared = (Rc::clone(&tokens[name].text), Type::new(&tokens[at].text, &array));
+            self.pending.entry(end).or_default().push(declared);
             if !tokens.get(end).is_some_and(|token| token.is(","))
                 || !tokens.get(end + 1).is_some_and(Token::is_word)
             {

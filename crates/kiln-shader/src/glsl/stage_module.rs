@@ -5,23 +5,36 @@ use std::ops::Range;
 
 use naga::front::glsl::{Error, ErrorKind, ExpectedToken, Frontend, Options, TokenValue};
 use naga::valid::{FunctionError, ValidationError};
-use naga::{AddressSpace, Barrier, Block, Expression, Module, Statement, TypeInner};
+use naga::{AddressSpace, Arena, Barrier, Block, Expression, Module, Statement, TypeInner};
 
-use super::{inout, lower, stage};
+use super::lower::Lowered;
+use super::source_map::{self, StageFunction};
+use super::{inout, layout, lower, stage, stride};
 use crate::explain::Finding;
 use crate::front::{self, Fault};
 use crate::lint::{self, Warning};
 use crate::{Stage, canonical, describe};
 
-/// What naga made of a stage: its WGSL and what is doubtful about it, or what is wrong.
-pub type Made = Result<(String, Vec<Warning>), Vec<Finding>>;
+/// What naga made of a stage, or what is wrong.
+pub type Made = Result<Translated, Vec<Finding>>;
+
+/// A stage in WGSL.
+#[derive(Debug)]
+pub struct Translated {
+    /// Its text.
+    pub wgsl: String,
+    /// What is doubtful about it.
+    pub warnings: Vec<Warning>,
+    /// Its functions.
+    pub functions: Vec<StageFunction>,
+}
 
 /// Variables' names by group and binding.
 pub type Names = BTreeMap<(u32, u32), String>;
 
 /// Translates a stage; with `lints`, also says what is doubtful.
-pub fn translate(text: &str, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fault> {
-    match front::on_deep_stack(Fault::Internal, || run(text, stage, names, lints)) {
+pub fn translate(lowered: &Lowered, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fault> {
+    match front::on_deep_stack(Fault::Internal, || run(lowered, stage, names, lints)) {
         // naga's GLSL front end panics where its WGSL front end says where the type is.
         Err(Fault::Internal(panic)) if panic.contains("LayoutError") && panic.contains("TooLarge") => {
             let message = "an array or struct has 2 GiB or more".to_owned();
@@ -31,15 +44,24 @@ pub fn translate(text: &str, stage: Stage, names: &Names, lints: bool) -> Result
     }
 }
 
-fn run(text: &str, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fault> {
+fn run(lowered: &Lowered, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fault> {
+    let text = &*lowered.text.text;
     let options = Options::from(stage::for_naga(stage));
     let mut module = match Frontend::default().parse(&options, text) {
         Ok(module) => module,
         Err(errors) => return Ok(Err(errors.errors.iter().map(|error| finding(text, error)).collect())),
     };
+    stride::close_gaps(&mut module);
+    let misplaced = layout::apply(&mut module, text, &lowered.moved);
+    if !misplaced.is_empty() {
+        return Ok(Err(misplaced));
+    }
     name_variables(&mut module, stage, names);
     name_members(&mut module);
-    module.functions.iter_mut().for_each(|(_, function)| repair(&mut function.body));
+    for (_, function) in module.functions.iter_mut() {
+        repair(&mut function.body);
+        measure_in_place(&mut function.expressions);
+    }
     inout::copy_parts(&mut module);
     if let Err(error) = front::validate(&module) {
         let mut finding = front::validation_finding(&module, &error);
@@ -55,11 +77,11 @@ fn run(text: &str, stage: Stage, names: &Names, lints: bool) -> Result<Made, Fau
         finding.labels.sort_by_key(|(_, label)| label.starts_with("naga::ir::Function"));
         return Ok(Err(vec![finding]));
     }
-    canonical::strip_unused(&mut module);
-    let info =
-        front::validate(&module).map_err(|error| Fault::Internal(format!("after compaction: {error:?}")))?;
+    let info = front::strip(&mut module)?;
     let warnings = if lints { lint::check(&module, &info) } else { Vec::new() };
-    canonical::emit(&module, &info).map(|wgsl| Ok((wgsl, warnings))).map_err(Fault::Internal)
+    let wgsl = canonical::emit(&module, &info).map_err(Fault::Internal)?;
+    let functions = source_map::functions(&module, &wgsl);
+    Ok(Ok(Translated { wgsl, warnings, functions }))
 }
 
 /// Gives variables the names that Kiln binds by, and the entry point its own.
@@ -112,6 +134,19 @@ fn name_members(module: &mut Module) {
         }
         if renamed {
             module.types.replace(handle, ty);
+        }
+    }
+}
+
+/// naga loads an array to ask for its length, which none without a length allows: the question goes to its place.
+fn measure_in_place(expressions: &mut Arena<Expression>) {
+    let measured = expressions.iter().filter_map(|(_, expression)| match expression {
+        Expression::ArrayLength(array) => Some(*array),
+        _ => None,
+    });
+    for array in measured.collect::<Vec<_>>() {
+        if let Expression::Load { pointer } = expressions[array] {
+            expressions[array] = expressions[pointer].clone();
         }
     }
 }
@@ -175,9 +210,6 @@ fn stored(module: &Module, error: &ValidationError) -> Option<(String, Option<Ra
 
 /// naga's types in GLSL's words.
 fn in_glsl(message: &str) -> String {
-    if let Some(operation) = message.strip_prefix("operation ").and_then(|rest| rest.split(' ').next()) {
-        return format!("these types do not go together in `{}`", operator(operation));
-    }
     if message.starts_with("unable to operate on image class") {
         return "textures of integers cannot be filtered".to_owned();
     }
@@ -185,6 +217,7 @@ fn in_glsl(message: &str) -> String {
     for (scalar, prefix) in [("f32", ""), ("i32", "i"), ("u32", "u"), ("bool", "b")] {
         for len in 2..=4 {
             text = text.replace(&format!("vec{len}<{scalar}>"), &format!("{prefix}vec{len}"));
+            text = text.replace(&format!("mat{len}x{len}<{scalar}>"), &format!("mat{len}"));
             for rows in 2..=4 {
                 text = text.replace(&format!("mat{len}x{rows}<{scalar}>"), &format!("mat{len}x{rows}"));
             }
@@ -193,36 +226,11 @@ fn in_glsl(message: &str) -> String {
     text.replace("`f32`", "`float`").replace("`i32`", "`int`").replace("`u32`", "`uint`")
 }
 
-/// The sign of naga's operator.
-fn operator(name: &str) -> &str {
-    match name {
-        "Add" => "+",
-        "Subtract" => "-",
-        "Multiply" => "*",
-        "Divide" => "/",
-        "Modulo" => "%",
-        "Equal" => "==",
-        "NotEqual" => "!=",
-        "Less" => "<",
-        "LessEqual" => "<=",
-        "Greater" => ">",
-        "GreaterEqual" => ">=",
-        "And" => "&",
-        "ExclusiveOr" => "^",
-        "InclusiveOr" => "|",
-        "LogicalAnd" => "&&",
-        "LogicalOr" => "||",
-        "ShiftLeft" => "<<",
-        "ShiftRight" => ">>",
-        other => other,
-    }
-}
-
 /// An operator between types that it does not take, which naga notices late: at what stands after it.
 fn incompatible(text: &str, error: &Error) -> Option<Finding> {
     let message = error.kind.to_string();
     let (_, operation) = message.split_once("IncompatibleOperands(")?;
-    let sign = operator(operation.trim_start_matches(['"', '\\']).split('(').next()?);
+    let sign = describe::sign(operation.trim_start_matches(['"', '\\']).split('(').next()?);
     let end = error.meta.to_range()?.end;
     let labels =
         text.get(..end)?.rfind(&format!(" {sign} ")).map(|at| (at + 1..at + 1 + sign.len(), String::new()));

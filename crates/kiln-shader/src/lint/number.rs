@@ -2,9 +2,8 @@
 //!
 //! So a guard on `length(v)` protects a later `length(v)`, and `x * x` is a square though `x` is loaded twice.
 
-use std::collections::HashMap;
-
 use naga::{BinaryOperator, Expression, Handle, Literal, MathFunction, UnaryOperator, VectorSize};
+use rustc_hash::FxHashMap;
 
 /// A value number.
 pub type Value = u32;
@@ -21,7 +20,7 @@ enum Key {
     Access(Value, Value),
     AccessIndex(Value, u32),
     Splat(VectorSize, Value),
-    Swizzle(Value, Vec<u32>),
+    Swizzle(Value, VectorSize, [u8; 4]),
     Unary(UnaryOperator, Value),
     Binary(BinaryOperator, Value, Value),
     Select(Value, Value, Value),
@@ -33,12 +32,12 @@ enum Key {
 /// Numbers of a function's expressions.
 pub struct Numbering {
     numbers: Vec<Value>,
-    known: HashMap<Key, Value>,
+    known: FxHashMap<Key, Value>,
 }
 
 impl Numbering {
     pub fn new(expression_count: usize) -> Numbering {
-        Numbering { numbers: vec![Value::MAX; expression_count], known: HashMap::new() }
+        Numbering { numbers: vec![Value::MAX; expression_count], known: FxHashMap::default() }
     }
 
     /// Number of an expression that [`Numbering::add`] has seen.
@@ -74,10 +73,10 @@ impl Numbering {
             Expression::Access { base, index } => Key::Access(self.of(base), self.of(index)),
             Expression::AccessIndex { base, index } => Key::AccessIndex(self.of(base), index),
             Expression::Splat { size, value } => Key::Splat(size, self.of(value)),
-            Expression::Swizzle { size, vector, pattern } => Key::Swizzle(
-                self.of(vector),
-                pattern[..size as usize].iter().map(|component| *component as u32).collect(),
-            ),
+            // Where patterns differ beyond their size the numbers do too, which only says less.
+            Expression::Swizzle { size, vector, pattern } => {
+                Key::Swizzle(self.of(vector), size, pattern.map(|component| component as u8))
+            }
             Expression::Unary { op, expr } => Key::Unary(op, self.of(expr)),
             Expression::Binary { op, left, right } => Key::Binary(op, self.of(left), self.of(right)),
             Expression::Select { condition, accept, reject } => {

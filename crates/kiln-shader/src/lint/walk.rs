@@ -1,9 +1,10 @@
 //! The way through one function: what is known at the statement it has come to.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 use naga::valid::FunctionInfo;
 use naga::{Expression, Function, Handle, LocalVariable, Span, TypeInner};
+use rustc_hash::FxHashMap;
 
 use super::Lint;
 use super::number::{self, Numbering};
@@ -36,7 +37,7 @@ pub struct Walk<'l, 'm> {
     /// Former contents of changed variables.
     pub journal: Vec<(usize, Local)>,
     /// What conditions say, by value number.
-    pub facts: HashMap<number::Value, Range>,
+    pub facts: FxHashMap<number::Value, Range>,
     pub former_facts: Vec<(number::Value, Option<Range>)>,
     /// Boolean variables that naga makes of `&&` and `||`.
     pub shortcuts: BTreeMap<usize, Shortcut>,
@@ -102,7 +103,7 @@ impl<'l, 'm> Walk<'l, 'm> {
             roots: vec![None; count],
             locals: Vec::new(),
             journal: Vec::new(),
-            facts: HashMap::new(),
+            facts: FxHashMap::default(),
             former_facts: Vec::new(),
             shortcuts: BTreeMap::new(),
             targets: Vec::new(),

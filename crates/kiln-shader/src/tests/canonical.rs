@@ -43,36 +43,6 @@ fn renamed_locals_do_not_change_it() {
 }
 
 #[test]
-fn source_map_has_the_authors_names_and_lines() {
-    let files = Files::new(&[
-        (
-            "a.wgsl",
-            "import b::half;\n\n@fragment fn fs_main(@location(0) shade: f32) -> @location(0) vec4f {\n return vec4f(half(shade)); }",
-        ),
-        ("b.wgsl", "// halves\nfn half(whole: f32) -> f32 { var part = whole; part *= 0.5; return part; }"),
-    ]);
-    let outcome = files.compile("a.wgsl", &[]);
-    let found: Vec<_> = outcome
-        .source_map
-        .functions
-        .iter()
-        .map(|function| {
-            let locals: Vec<_> = function.locals.iter().map(|(a, b)| (a.as_str(), b.as_str())).collect();
-            (function.source_name.as_str(), function.file.as_str(), function.line, locals)
-        })
-        .collect();
-    assert_eq!(
-        found,
-        [
-            ("half", "b.wgsl", 2, vec![("argument_1", "whole"), ("variable", "part")]),
-            ("fs_main", "a.wgsl", 4, vec![("argument", "shade")]),
-        ]
-    );
-    let text = compiled(outcome).wgsl;
-    assert!(text.contains("fn half(argument_1: f32)") && text.contains("var variable: f32"), "{text}");
-}
-
-#[test]
 fn a_changed_constant_changes_it() {
     assert_ne!(compile_one(PLAIN).wgsl, compile_one(&PLAIN.replace("2.0;\n", "2.5;\n")).wgsl);
 }
@@ -204,6 +174,19 @@ fn halves_are_packed_without_optional_features() {
     compile_one(
         "@fragment fn fs_main(@location(0) x: vec2f) -> @location(0) vec4f {
         return vec4f(unpack2x16float(pack2x16float(x)), quantizeToF16(x)); }",
+    );
+}
+
+#[test]
+fn arithmetic_of_halves_is_refused_as_optional() {
+    let text = "enable f16;
+        @fragment fn fs_main(@location(0) x: f32) -> @location(0) vec4f { return vec4f(f32(f16(x))); }";
+    let outcome = Files::new(&[("a.wgsl", text)]).compile("a.wgsl", &[]);
+    assert!(outcome.compiled.is_none());
+    assert!(
+        format!("{:?}", outcome.diagnostics[0].help).contains("optional features"),
+        "{:?}",
+        outcome.diagnostics
     );
 }
 

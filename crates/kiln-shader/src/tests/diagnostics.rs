@@ -85,7 +85,7 @@ fn type_error_after_cuts_points_at_the_authors_line() {
         &files,
         &[],
         "
-error: the function returns `f32`, this value has another type
+error: the function returns `f32`, this value is `u32`
   --> lib/b.wgsl:6:19
   |
 6 |     @else let y = 2u;
@@ -126,7 +126,7 @@ fn wrong_argument_is_named_with_its_type() {
         )],
         &[],
         "
-error: argument 1 of `f` must be `f32`, this value has another type
+error: argument 1 of `f` must be `f32`, this value is `u32`
   --> a.wgsl:4:20
   |
 4 |     return vec4f(f(1u));
@@ -398,7 +398,45 @@ fn first_fault_of_every_module_is_reported() {
         diagnostics.map(|found| (found.file.unwrap(), found.span.unwrap().line)).collect()
     };
     let place = |file: &str, line: u32| (file.to_owned(), line);
-    // What a.wgsl itself has wrong depends on what the broken modules would have declared.
-    assert_eq!(places("a.wgsl"), [place("b.wgsl", 1), place("c.wgsl", 2)]);
+    // The broken functions are known by their heads.
+    assert_eq!(places("a.wgsl"), [place("a.wgsl", 3), place("b.wgsl", 1), place("c.wgsl", 2)]);
     assert_eq!(places("e.wgsl"), [place("e.wgsl", 2)]);
+}
+
+#[test]
+fn what_only_follows_from_a_broken_declaration_is_not_reported() {
+    let root = "import b::{S, f};\nfn g(s: S) -> f32 { return s.x; }\n@fragment fn fs_main() -> @location(0) vec4f { return vec4f(g(S()) + f(), LIMIT); }";
+    let places = |root: &str, b: &str| -> Vec<String> {
+        let outcome = Files::new(&[("a.wgsl", root), ("b.wgsl", b)]).compile("a.wgsl", &[]);
+        outcome.diagnostics.into_iter().map(|found| found.file.unwrap()).collect()
+    };
+    let broken = "struct S { x: flaot }\nfn f() -> f32 { return 1.0; }\nconst LIMIT = oops;";
+    assert_eq!(places(root, broken), ["b.wgsl"]);
+    // The twin: what the root has wrong besides is.
+    let root = format!("{root}\nfn own() -> f32 {{ return 1u; }}");
+    assert_eq!(places(&root, broken), ["a.wgsl", "b.wgsl"]);
+}
+
+#[test]
+fn types_that_do_not_go_together_are_named_as_their_author_writes_them() {
+    let message = |statement: &str| {
+        let text = format!(
+            "var<private> v: vec3f;\nvar<private> u: u32;\nfn f(x: f32) -> f32 {{ return x; }}\n@fragment fn fs_main() {{ {statement} }}"
+        );
+        rendered(&Files::new(&[("a.wgsl", &text)]).compile("a.wgsl", &[]))
+            .lines()
+            .next()
+            .unwrap_or_default()
+            .to_owned()
+    };
+    let expected = [
+        ("let x = v + vec2f(1.0);", "error: `+` does not take `vec3<f32>` and `vec2<f32>`"),
+        ("let x = -u;", "error: `-` does not take `u32`"),
+        ("let x = u && true;", "error: `&&` does not take `u32`"),
+        ("if u { }", "error: the condition of `if` must be `bool`, this is `u32`"),
+        ("let x = f(v);", "error: argument 1 of `f` must be `f32`, this value is `vec3<f32>`"),
+        ("let x = v + v.x;", ""),
+    ];
+    let actual = expected.map(|(statement, _)| (statement, message(statement)));
+    assert_eq!(actual, expected.map(|(statement, expected)| (statement, expected.to_owned())));
 }

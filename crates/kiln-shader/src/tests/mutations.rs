@@ -4,6 +4,8 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::cases::{Case, cases, summary};
+use super::damage::{bytes, tokens};
+use super::random::Random;
 use super::rendered;
 
 const HEAD: &str = "#version 450\nlayout(location = 0) out vec4 colour;\n";
@@ -165,63 +167,44 @@ fn equal_programs_give_equal_text_whatever_their_comments() {
     }
 }
 
-/// xorshift64: the same numbers on every run.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, count: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        usize::try_from(self.0 % count as u64).unwrap()
-    }
+/// A word in code is the author's own, a comment nobody's.
+#[test]
+fn features_are_named_by_conditions_and_macros_alone() {
+    let features = |text: &str| -> String {
+        let text = format!("{HEAD}{text}\nvoid main() {{ colour = vec4(1.0); }}");
+        let case = Case::of(&[("a.frag", &text)]);
+        let outcome = case.compile();
+        assert!(outcome.compiled.is_some(), "{}", rendered(&outcome));
+        let scanned = crate::scan(&crate::Program::of("a.frag"), &mut |path| case.files.get(path).cloned());
+        assert_eq!(scanned.features, outcome.features);
+        outcome.features.into_iter().collect::<Vec<_>>().join(" ")
+    };
+    assert_eq!(
+        features("const int FEATURE_COUNT = 3; // FEATURE_NOTE\n/*\n#ifdef FEATURE_OLD\n#endif */"),
+        ""
+    );
+    assert_eq!(features("#define FEATURE_OWN 2"), "");
+    // The twins.
+    let text = "#if FEATURE_A && defined(FEATURE_B)\n#elif FEATURE_C\n#endif\n#ifdef FEATURE_D\n#endif\n#ifndef FEATURE_E\n#endif";
+    assert_eq!(features(text), "a b c d e");
+    assert_eq!(features("#if 0\n#ifdef FEATURE_INNER\n#endif\n#endif"), "inner");
+    assert_eq!(features("#define HAS(x) FEATURE_F\n#if HAS(1)\n#endif"), "f");
 }
-
-const PIECES: [&str; 24] = [
-    "{",
-    "}",
-    "(",
-    ")",
-    "[",
-    "]",
-    ";",
-    ",",
-    "#",
-    "##",
-    "\n#if ",
-    "\n#endif\n",
-    "é",
-    "\"",
-    "sampler2D",
-    "uniform ",
-    "in ",
-    "layout(",
-    "=",
-    ".",
-    "struct ",
-    "bool ",
-    "0",
-    "/*",
-];
 
 #[test]
 fn mutated_programs_neither_panic_nor_hang() {
-    let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    let mut random = Random::new(1);
     let (mut failed, mut count) = (0, 0);
     for (name, case) in cases() {
         for _ in 0..60 {
             let mut mutated = case.clone();
             let paths: Vec<String> =
                 case.files.keys().filter(|path| !path.ends_with(".txt")).cloned().collect();
-            let path = &paths[random.below(paths.len())];
-            let mut text: Vec<char> = case.files[path].chars().collect();
+            let path = random.pick(&paths);
+            let mut text = case.files[path].to_string();
             for _ in 0..=random.below(3) {
-                let at = random.below(text.len() + 1);
-                let end = (at + random.below(12)).min(text.len());
-                let piece = PIECES[random.below(PIECES.len())].chars();
-                text.splice(at..if random.below(2) == 0 { at } else { end }, piece);
+                text = if random.one_in(4) { bytes(text, &mut random) } else { tokens(&text, &mut random) };
             }
-            let text: String = text.into_iter().collect();
             mutated.files.insert(path.clone(), Arc::from(text.as_str()));
             let outcome = mutated.compile();
             let has_errors = kiln_diagnostic::has_errors(&outcome.diagnostics);

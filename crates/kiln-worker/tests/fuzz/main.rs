@@ -8,6 +8,7 @@
 
 mod check;
 mod corpus;
+mod damage;
 mod generate;
 mod mutate;
 mod random;

@@ -1,6 +1,5 @@
 #version 450
 layout(local_size_x = 1) in;
-layout(row_major) uniform;
 layout(std140) buffer;
 struct Small { float a; float b; };
 struct Holder { vec4 a; float b[3]; };
@@ -10,8 +9,6 @@ layout(std140, binding = 2) buffer Holders { Holder holders[]; };
 layout(std140, binding = 3) buffer Matrix { mat2 turned; };
 layout(scalar, binding = 4) buffer Tight { vec3 tight[]; };
 layout(std430, binding = 5) uniform Weights { float weights[4]; };
-layout(std140, row_major) uniform Turn { mat4 turn; };
-layout(std140) uniform Moved { layout(offset = 32) vec4 a; layout(align = 64) vec4 b; layout(row_major) mat3 c; };
 void main() {
     values[0] = weights[1];
 }

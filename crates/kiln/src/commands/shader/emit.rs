@@ -1,5 +1,6 @@
 //! `kiln shader emit`.
 
+use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
@@ -23,6 +24,9 @@ type File = (String, Vec<u8>);
 
 pub(super) fn run(args: &EmitArgs) -> anyhow::Result<ExitCode> {
     let (subjects, mut diagnostics) = subjects(&args.subjects)?;
+    if args.out.is_some() {
+        check_names(&subjects)?;
+    }
     let mut files: Vec<File> = Vec::new();
     for subject in &subjects {
         let mut variants = subject.compile()?;
@@ -80,15 +84,35 @@ fn emit(
     Ok(files)
 }
 
-/// `pbr`, or `pbr.sheen+clearcoat`: the first file's name and the variant's, if it is not the plain one.
+/// What the files of a shader are called: its name in a project, else that of its first file.
+fn name(subject: &Subject) -> &str {
+    let file = subject.name.rsplit('/').next().unwrap_or(&subject.name);
+    file.split('.').next().unwrap_or(file)
+}
+
+/// `pbr`, or `pbr.sheen+clearcoat`: the shader's name and the variant's, if it is not the plain one.
 fn stem(subject: &Subject, variant: &Variant) -> String {
-    let file = subject.program.subject();
-    let name = file.rsplit('/').next().unwrap_or(file);
-    let name = name.split('.').next().unwrap_or(name);
+    let name = name(subject);
     match variant.names.iter().find(|name| *name == "base").or(variant.names.first()) {
         Some(variant) if variant != "base" => format!("{name}.{variant}"),
         _ => name.to_owned(),
     }
+}
+
+/// Refuses shaders whose files would take each other's place, also where case makes no difference.
+fn check_names(subjects: &[Subject]) -> Result<(), WrongInput> {
+    let mut known: BTreeMap<String, &Subject> = BTreeMap::new();
+    for subject in subjects {
+        if let Some(other) = known.insert(name(subject).to_lowercase(), subject) {
+            let [first, second] =
+                [other, subject].map(|one| format!("`{}` of {}", one.name, one.base.display()));
+            return Err(WrongInput(format!(
+                "{first} and {second} would be written to the same files, {}.…\n  help: write them to a folder each",
+                name(subject)
+            )));
+        }
+    }
+    Ok(())
 }
 
 fn write(out: &Path, files: &[File]) -> anyhow::Result<()> {

@@ -76,6 +76,7 @@ fn lines(reflection: &Reflection) -> Vec<String> {
             ParameterPlace::Member { uniform } => format!("member of {uniform}"),
         };
         let widget = match &parameter.widget {
+            Widget::Number => "number".to_owned(),
             Widget::Slider { least, greatest } => format!("slider from {least} to {greatest}"),
             Widget::Color => "color".to_owned(),
             Widget::Toggle => "toggle".to_owned(),

@@ -232,16 +232,26 @@ impl Variant {
     }
 }
 
-/// Does `work` on all items, in as many threads as there are CPUs: each has a worker process of its own. The results come
-/// in the order of the items.
+/// Runs of neighbours that a thread takes at a time, for each thread: enough that all end at about the same time.
+const RUNS_PER_THREAD: usize = 8;
+
+/// Does `work` on all items, in as many threads as there are CPUs: each has a worker process of its own. Neighbours go to
+/// the same one, since they are alike and it remembers. The results come in the order of the items.
 fn in_parallel<T: Send, R: Send>(
     items: Vec<T>,
     work: impl Fn(T) -> anyhow::Result<R> + Sync,
 ) -> anyhow::Result<Vec<R>> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from).min(items.len());
+    let run_length = (items.len() / (threads.max(1) * RUNS_PER_THREAD)).max(1);
     let items = Mutex::new(items.into_iter().enumerate());
-    let next = || items.lock().unwrap_or_else(PoisonError::into_inner).next();
-    let take_all = || std::iter::from_fn(next).map(|(at, item)| (at, work(item))).collect::<Vec<_>>();
+    let next_run = || -> Option<Vec<(usize, T)>> {
+        let mut items = items.lock().unwrap_or_else(PoisonError::into_inner);
+        Some(items.by_ref().take(run_length).collect()).filter(|run: &Vec<_>| !run.is_empty())
+    };
+    let take_all = || {
+        let runs = std::iter::from_fn(next_run).flatten();
+        runs.map(|(at, item)| (at, work(item))).collect::<Vec<_>>()
+    };
     let mut results: Vec<(usize, anyhow::Result<R>)> = std::thread::scope(|scope| {
         let threads: Vec<_> = (0..threads).map(|_| scope.spawn(take_all)).collect();
         threads

@@ -1,6 +1,6 @@
 //! `kiln shader variants`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::process::ExitCode;
 
 use kiln_build::Digest;
@@ -23,13 +23,14 @@ pub(super) fn run(args: &VariantsArgs) -> anyhow::Result<ExitCode> {
             let compiled = variant.outcome.compiled.as_ref();
             texts.entry(compiled.map(|shader| Digest::of(shader.wgsl.as_bytes()))).or_default().push(variant);
         }
-        let (asked, compiled) = (subject.asked.len(), variants.len());
-        let artefacts = texts.keys().flatten().count();
+        let Counts { asked, compiled, broken, shared, artefacts } = Counts::new(&variants);
         shaders.push(json!({
             "shader": subject.name,
             "features": subject.features,
             "asked": asked,
             "compiled": compiled,
+            "broken": broken,
+            "shared": shared,
             "artefacts": artefacts,
             "variants": texts.iter().map(|(digest, variants)| json!({
                 "sha256": digest.map(|digest| digest.to_string()),
@@ -49,10 +50,8 @@ pub(super) fn run(args: &VariantsArgs) -> anyhow::Result<ExitCode> {
             let bytes = size_of(variants[0]).map_or_else(String::new, |bytes| report::size(bytes as u64));
             say!("  {digest:<16} {bytes:>9}   {}", names(variants).join(" = "));
         }
-        say!(
-            "  {asked} asked, {compiled} compiled, {} shared, {artefacts} artefacts",
-            asked.saturating_sub(artefacts)
-        );
+        let broken = if broken > 0 { format!(", {broken} broken") } else { String::new() };
+        say!("  {asked} asked, {compiled} compiled, {shared} shared, {artefacts} artefacts{broken}");
     }
     if args.json {
         say!("{:#}", json!({"shaders": shaders, "diagnostics": diagnostics}));
@@ -60,6 +59,32 @@ pub(super) fn run(args: &VariantsArgs) -> anyhow::Result<ExitCode> {
         report::print_diagnostics(&diagnostics, false);
     }
     Ok(exit_code(&diagnostics))
+}
+
+/// How many feature sets there are of each kind.
+struct Counts {
+    /// Those that were asked for.
+    asked: usize,
+    /// Those of them that compile and can differ from each other.
+    compiled: usize,
+    /// Those that were asked for and do not compile.
+    broken: usize,
+    /// Those that were asked for and are one with another.
+    shared: usize,
+    /// Different texts.
+    artefacts: usize,
+}
+
+impl Counts {
+    fn new(variants: &[Variant]) -> Counts {
+        let asked = |variants: &[&Variant]| variants.iter().map(|variant| variant.names.len()).sum::<usize>();
+        let (good, bad): (Vec<_>, Vec<_>) =
+            variants.iter().partition(|variant| variant.outcome.compiled.is_some());
+        let (sound, broken) = (asked(&good), asked(&bad));
+        let texts = good.iter().filter_map(|variant| Some(&variant.outcome.compiled.as_ref()?.wgsl));
+        let artefacts = texts.collect::<BTreeSet<_>>().len();
+        Counts { asked: sound + broken, compiled: good.len(), broken, shared: sound - artefacts, artefacts }
+    }
 }
 
 fn names(variants: &[&Variant]) -> Vec<String> {
