@@ -1,4 +1,4 @@
-// Directional albedo of the sheen lobe, for as long as no table of it is baked.
+// Directional albedo of the sheen lobe without a table.
 
 // Albedo of Charlie's distribution with Ashikhmin's visibility, clamped to 1 (the model itself reaches 3 at
 // grazing views of roughness 0.1). At the horizon opposite the view the half vector has

@@ -1,8 +1,7 @@
 // Fibres over the base. KHR_materials_sheen.
 
-import lib::environment::{dominant_direction, specular_radiance};
+import lib::environment::{sheen_albedo, sheen_radiance};
 import lib::material::texture_coordinate;
-import lib::sheen::charlie_albedo;
 import lib::vector::max_component;
 import super::interface::{material, Varying};
 
@@ -24,14 +23,10 @@ fn sheen(in: Varying) -> Sheen {
     return Sheen(saturate(color), saturate(material.sheen_roughness_factor * texel.a));
 }
 
-// Approximate until the environment has a Charlie chain: the GGX chain stands in for it. Charlie's lobe
-// sits at the horizon and is wide for every roughness, so the chain is read from its middle upwards; at the
-// bottom it would mirror like lacquer. What makes it velvet, the bright rim, is the directional albedo.
+// The sheen's light, and what it leaves of the layers below: the albedo scaling of KHR_materials_sheen. The chain is looked
+// up in the mirror direction, as the Khronos sample viewer does.
 fn under_sheen(below: vec3f, sheen: Sheen, normal: vec3f, view: vec3f, occlusion: f32) -> vec3f {
-    let n_dot_v = saturate(dot(normal, view));
-    let albedo = charlie_albedo(n_dot_v, sheen.perceptual_roughness);
-    let roughness = 0.5 + 0.5 * sheen.perceptual_roughness;
-    let direction = dominant_direction(normal, reflect(-view, normal), roughness);
-    let radiance = sheen.color * albedo * specular_radiance(direction, roughness) * occlusion;
-    return radiance + below * (1.0 - max_component(sheen.color) * albedo);
+    let albedo = sheen_albedo(saturate(dot(normal, view)), sheen.perceptual_roughness);
+    let incoming = sheen_radiance(reflect(-view, normal), sheen.perceptual_roughness);
+    return sheen.color * albedo * incoming * occlusion + below * (1.0 - max_component(sheen.color) * albedo);
 }

@@ -41,7 +41,9 @@ impl FrameBinding {
                 Slot::EnvSkybox => Some(&environment.skybox.view),
                 Slot::EnvIrradiance => Some(&environment.irradiance.view),
                 Slot::EnvSpecular => Some(&environment.specular.view),
+                Slot::EnvSheen => Some(&environment.sheen.view),
                 Slot::LutGgx => Some(&environment.lut_ggx.view),
+                Slot::LutCharlie => Some(&environment.lut_charlie.view),
                 Slot::HdrColor => hdr_color,
                 _ => None,
             };

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use kiln_diagnostic::Diagnostic;
 use kiln_gpu::Gpu;
 use kiln_link::{Revision, Target};
-use kiln_scene::{Effect, Material, variant_name};
+use kiln_scene::{Material, variant_name};
 use kiln_shader::Reflection;
 
 use crate::binding::FrameBinding;
@@ -18,7 +18,7 @@ use crate::parameter::{OfferedParameter, ParameterValues};
 use crate::program::{Program, Raster};
 use crate::report::{ApplyReport, choose, describe};
 use crate::scene_gpu::GpuScene;
-use crate::target::{CubeMeta, LutMeta, Role, SceneMeta, ShaderMeta, read_meta};
+use crate::target::{CubeMeta, LutMeta, ProjectMeta, Role, SceneMeta, ShaderMeta, read_meta};
 use crate::texture::{CubeTexture, LutTexture, create_trilinear_sampler};
 use crate::view::Selection;
 
@@ -28,7 +28,9 @@ pub(crate) struct Environment {
     pub skybox: Arc<CubeTexture>,
     pub irradiance: Arc<CubeTexture>,
     pub specular: Arc<CubeTexture>,
+    pub sheen: Arc<CubeTexture>,
     pub lut_ggx: Arc<LutTexture>,
+    pub lut_charlie: Arc<LutTexture>,
     pub sampler: wgpu::Sampler,
 }
 
@@ -160,13 +162,18 @@ impl Preparer {
             Some(env) => self.cube(revision, &format!("env/{env}/{map}"), report),
             None => Arc::clone(&self.neutral_cube),
         };
-        let (skybox, irradiance, specular) = (cube("skybox"), cube("irradiance"), cube("specular"));
-        let lut_ggx = self.lut(revision, "lut/ggx", report);
-        Environment { skybox, irradiance, specular, lut_ggx, sampler: self.sampler.clone() }
+        let [skybox, irradiance, specular, sheen] =
+            ["skybox", "irradiance", "specular", "sheen"].map(&mut cube);
+        let [lut_ggx, lut_charlie] = ["lut/ggx", "lut/charlie"].map(|name| self.lut(revision, name, report));
+        let sampler = self.sampler.clone();
+        Environment { skybox, irradiance, specular, sheen, lut_ggx, lut_charlie, sampler }
     }
 
     fn cube(&mut self, revision: &Revision, name: &str, report: &mut ApplyReport) -> Arc<CubeTexture> {
         let Some(target) = revision.table.targets.get(name) else {
+            if project_meta(revision).unread.contains(name) {
+                return Arc::clone(&self.neutral_cube);
+            }
             let last_good = self.cubes.last_good(name);
             report.notes.push(absent(name, revision, last_good.is_some()));
             return last_good.unwrap_or_else(|| Arc::clone(&self.neutral_cube));
@@ -184,6 +191,9 @@ impl Preparer {
 
     fn lut(&mut self, revision: &Revision, name: &str, report: &mut ApplyReport) -> Arc<LutTexture> {
         let Some(target) = revision.table.targets.get(name) else {
+            if project_meta(revision).unread.contains(name) {
+                return Arc::clone(&self.neutral_lut);
+            }
             let last_good = self.luts.last_good(name);
             report.notes.push(absent(name, revision, last_good.is_some()));
             return last_good.unwrap_or_else(|| Arc::clone(&self.neutral_lut));
@@ -269,9 +279,9 @@ impl Preparer {
     ) -> DrawList {
         let mut found: HashMap<String, Option<Arc<Program>>> = HashMap::new();
         let gpu = self.gpu.clone();
+        let overrides = project_meta(revision).effects;
         let mut find = |material: &Material| {
-            note_approximations(material, &mut report.notes);
-            let name = format!("shader/{shader}/{}", variant_name(&material.effects));
+            let name = format!("shader/{shader}/{}", variant_name(&overrides.apply(&material.effects)));
             if !found.contains_key(&name) {
                 let program = self.variant(revision, shader, &name, report);
                 found.insert(name.clone(), program);
@@ -318,6 +328,11 @@ impl Preparer {
     }
 }
 
+fn project_meta(revision: &Revision) -> ProjectMeta {
+    let project = revision.table.targets.get("project");
+    project.and_then(|project| read_meta("project", project, "project").ok()).unwrap_or_default()
+}
+
 fn scene_meta(revision: &Revision, name: &str, report: &mut ApplyReport) -> Option<SceneMeta> {
     let target_name = format!("scene/{name}");
     let Some(target) = revision.table.targets.get(&target_name) else {
@@ -351,11 +366,4 @@ fn read_shader(revision: &Revision, name: &str) -> Result<(String, Reflection), 
     let reflection = serde_json::from_slice(part("reflection")?)
         .map_err(|error| Diagnostic::error(format!("the interface of `{name}` is malformed: {error}")))?;
     Ok((wgsl, reflection))
-}
-
-fn note_approximations(material: &Material, notes: &mut Vec<String>) {
-    let note = "sheen is approximate until the Charlie chain exists";
-    if material.effects.contains(&Effect::Sheen) && !notes.iter().any(|other| other == note) {
-        notes.push(note.to_owned());
-    }
 }

@@ -459,10 +459,10 @@ fn binding_type(bound: &Bound) -> wgpu::BindingType {
             has_dynamic_offset: bound.slot == Slot::Draw,
             min_binding_size: bound.block.as_ref().and_then(|(size, _)| u64::from(*size).try_into().ok()),
         },
-        Slot::EnvSkybox | Slot::EnvIrradiance | Slot::EnvSpecular => {
+        Slot::EnvSkybox | Slot::EnvIrradiance | Slot::EnvSpecular | Slot::EnvSheen => {
             texture(wgpu::TextureViewDimension::Cube)
         }
-        Slot::LutGgx | Slot::HdrColor | Slot::MaterialTexture(_) | Slot::OwnTexture => {
+        Slot::LutGgx | Slot::LutCharlie | Slot::HdrColor | Slot::MaterialTexture(_) | Slot::OwnTexture => {
             texture(wgpu::TextureViewDimension::D2)
         }
         Slot::EnvSampler | Slot::LutSampler | Slot::MaterialSampler(_) | Slot::OwnSampler => {

@@ -107,7 +107,9 @@ pub(crate) enum Slot {
     EnvSkybox,
     EnvIrradiance,
     EnvSpecular,
+    EnvSheen,
     LutGgx,
+    LutCharlie,
     HdrColor,
     EnvSampler,
     LutSampler,
@@ -123,12 +125,14 @@ pub(crate) enum Slot {
     OwnSampler,
 }
 
-const FIXED: [(Slot, &str); 11] = [
+const FIXED: [(Slot, &str); 13] = [
     (Slot::Frame, "frame"),
     (Slot::EnvSkybox, "env_skybox"),
     (Slot::EnvIrradiance, "env_irradiance"),
     (Slot::EnvSpecular, "env_specular"),
+    (Slot::EnvSheen, "env_sheen"),
     (Slot::LutGgx, "lut_ggx"),
+    (Slot::LutCharlie, "lut_charlie"),
     (Slot::HdrColor, "hdr_color"),
     (Slot::EnvSampler, "env_sampler"),
     (Slot::LutSampler, "lut_sampler"),
@@ -185,8 +189,12 @@ impl Slot {
     pub fn expects(self) -> &'static str {
         match self {
             Slot::Frame | Slot::Material | Slot::Draw | Slot::Params => "uniform",
-            Slot::EnvSkybox | Slot::EnvIrradiance | Slot::EnvSpecular => "texture_cube<f32>",
-            Slot::LutGgx | Slot::HdrColor | Slot::MaterialTexture(_) | Slot::OwnTexture => "texture_2d<f32>",
+            Slot::EnvSkybox | Slot::EnvIrradiance | Slot::EnvSpecular | Slot::EnvSheen => "texture_cube<f32>",
+            Slot::LutGgx
+            | Slot::LutCharlie
+            | Slot::HdrColor
+            | Slot::MaterialTexture(_)
+            | Slot::OwnTexture => "texture_2d<f32>",
             Slot::EnvSampler | Slot::LutSampler | Slot::MaterialSampler(_) | Slot::OwnSampler => "sampler",
         }
     }

@@ -1,8 +1,11 @@
 //! What the targets of a revision say about themselves.
 
+use std::collections::BTreeSet;
+
 use kiln_diagnostic::Diagnostic;
 use kiln_image::ktx2;
 use kiln_link::Target;
+use kiln_scene::EffectSet;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
@@ -15,6 +18,8 @@ pub(crate) struct CubeMeta {
     /// Radiance is texel · 2^scale_log2.
     #[serde(default)]
     pub scale_log2: i32,
+    /// Set where only the levels from this one on, as far as there are parts, are read.
+    pub first_level: Option<u32>,
 }
 
 /// `meta` of `lut/ggx`.
@@ -59,6 +64,28 @@ pub(crate) struct ProjectMeta {
     pub scenes: Vec<String>,
     #[serde(default)]
     pub envs: Vec<String>,
+    /// Targets that are absent because nothing reads them.
+    #[serde(default)]
+    pub unread: BTreeSet<String>,
+    /// What scenes are drawn with besides, and without.
+    #[serde(default)]
+    pub effects: EffectOverrides,
+}
+
+/// `[effects]` of kiln.toml.
+#[derive(Clone, Debug, Default, Deserialize)]
+pub(crate) struct EffectOverrides {
+    #[serde(default)]
+    force: EffectSet,
+    #[serde(default)]
+    forbid: EffectSet,
+}
+
+impl EffectOverrides {
+    /// The effects that a material is drawn with.
+    pub fn apply(&self, effects: &EffectSet) -> EffectSet {
+        effects.union(&self.force).filter(|effect| !self.forbid.contains(effect)).copied().collect()
+    }
 }
 
 /// What a shader is for.

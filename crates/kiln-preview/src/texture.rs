@@ -18,6 +18,8 @@ use crate::target::{CubeMeta, LutMeta, TexelFormat};
 pub(crate) struct CubeTexture {
     pub view: wgpu::TextureView,
     pub levels: u32,
+    /// First and last level that there is; the others are black, and nothing reads them.
+    present: [u32; 2],
     /// Radiance is texel · scale.
     pub scale: f32,
     /// What differs from the target, for the user.
@@ -62,9 +64,17 @@ impl CubeTexture {
         Ok(CubeTexture {
             view: cube_view(&texture),
             levels: meta.levels,
+            present: [parts.first(), parts.last()].map(|level| level.map_or(0, |(level, _)| *level)),
             scale: exp2(meta.scale_log2.saturating_add(extra_log2)),
             notes: notes_on_cube(gpu, name, meta, parts.len()),
         })
+    }
+
+    /// The perceptual roughness that can be looked up nearest to a wish; 0 stays what it is, no lookup.
+    pub fn nearest_roughness(&self, wish: f32) -> f32 {
+        let level_max = (self.levels - 1).max(1) as f32;
+        let [first, last] = self.present.map(|level| level as f32 / level_max);
+        if wish > 0.0 { wish.clamp(first, last.max(first)) } else { wish }
     }
 
     /// The same dim grey from everywhere: stands in for an absent map.
@@ -72,7 +82,7 @@ impl CubeTexture {
         let texture = create_texture(gpu, "neutral environment", 1, 6, 1, wgpu::TextureFormat::Rgba16Float);
         let grey = [neutral::RADIANCE, neutral::RADIANCE, neutral::RADIANCE, 1.0].map(f16::from_f32);
         write_level(gpu, &texture, 0, bytemuck::cast_slice(&[grey; 6].map(|texel| texel.map(f16::to_bits))));
-        CubeTexture { view: cube_view(&texture), levels: 1, scale: 1.0, notes: Vec::new() }
+        CubeTexture { view: cube_view(&texture), levels: 1, present: [0, 0], scale: 1.0, notes: Vec::new() }
     }
 }
 
@@ -212,7 +222,7 @@ fn notes_on_cube(gpu: &Gpu, name: &str, meta: &CubeMeta, present: usize) -> Vec<
     if filterable(gpu, meta.format) != meta.format {
         notes.push(format!("`{name}` is shown in 16-bit floats: this device does not filter 32-bit ones"));
     }
-    if present < meta.levels as usize {
+    if present < meta.levels as usize && meta.first_level.is_none() {
         notes.push(format!(
             "{} of {} levels of `{name}` are absent and black",
             meta.levels as usize - present,

@@ -193,12 +193,25 @@ pub(crate) fn plan_project(
         "scenes": project.scenes.keys().collect::<Vec<_>>(),
         "envs": project.envs.keys().collect::<Vec<_>>(),
     });
+    let unread = unread_targets(&envs, &planner.targets);
+    if !unread.is_empty() {
+        meta["unread"] = json!(unread);
+    }
     if let Some(overrides) = project.effects.to_json() {
         meta["effects"] = overrides;
     }
     planner.target("project".to_owned(), "project", meta, Vec::new());
     let Planner { graph, targets, diagnostics, subjects } = planner;
     Ok(Plan { project, graph, targets, scenes, envs, diagnostics, subjects })
+}
+
+/// Maps and tables of the preview's shaders that are not made because nothing reads them.
+fn unread_targets(envs: &BTreeMap<String, EnvDemand>, made: &[TargetSpec]) -> Vec<String> {
+    let maps = ["irradiance", "specular", "sheen"];
+    let of_env = |name: &String| maps.map(|map| format!("env/{name}/{map}"));
+    let tables = ["lut/ggx", "lut/charlie"].map(str::to_owned);
+    let names = envs.keys().flat_map(of_env).chain(tables);
+    names.filter(|name| !made.iter().any(|target| target.name == *name)).collect()
 }
 
 pub(crate) fn read_project(engine: &Engine, diagnostics: &mut Vec<Diagnostic>) -> Project {

@@ -8,7 +8,9 @@ use crate::materials::{flatten, parse_alpha_mode, transform_rows, uv_set};
 use crate::prune::{Pruned, prune, retain_textures, settle};
 use crate::schema::{self, TextureInfo};
 use crate::textures::{Found, TextureTable, sampler};
-use crate::{ColorSpace, LightReads, Material, Scene, SceneError, Texture, TextureRef, extensions, specular_glossiness};
+use crate::{
+    ColorSpace, LightReads, Material, Scene, SceneError, Texture, TextureRef, extensions, specular_glossiness,
+};
 
 pub(crate) struct MaterialTable<'a, 'b> {
     root: &'a schema::Root,

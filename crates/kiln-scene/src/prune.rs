@@ -359,8 +359,9 @@ fn reads(material: &Material, look: Look<'_>) -> LightReads {
     if extensions.transmission.is_some() {
         ggx[0] *= share_refracted(material);
     }
-    if let Some(Clearcoat { clearcoat_roughness_factor: factor, clearcoat_roughness_texture: texture, .. }) =
-        &extensions.clearcoat
+    if let Some(Clearcoat {
+        clearcoat_roughness_factor: factor, clearcoat_roughness_texture: texture, ..
+    }) = &extensions.clearcoat
     {
         let coat = interval(*factor, texture.as_ref(), look);
         ggx = [ggx[0].min(coat[0]), ggx[1].max(coat[1])];

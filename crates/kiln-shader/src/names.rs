@@ -39,7 +39,7 @@ impl Group {
 }
 
 /// Members of the uniform `frame`.
-pub const FRAME_MEMBERS: [&str; 13] = [
+pub const FRAME_MEMBERS: [&str; 15] = [
     "clip_from_world",
     "world_from_clip",
     "camera_position",
@@ -50,6 +50,8 @@ pub const FRAME_MEMBERS: [&str; 13] = [
     "skybox_scale",
     "irradiance_scale",
     "specular_scale",
+    "sheen_level_max",
+    "sheen_scale",
     "background_blur",
     "viewport_size",
     "time_s",
@@ -114,8 +116,17 @@ pub const MATERIAL_TEXTURES: [&str; 19] = [
 ];
 
 /// Textures and samplers of the frame.
-pub const FRAME_RESOURCES: [&str; 7] =
-    ["env_skybox", "env_irradiance", "env_specular", "lut_ggx", "hdr_color", "env_sampler", "lut_sampler"];
+pub const FRAME_RESOURCES: [&str; 9] = [
+    "env_skybox",
+    "env_irradiance",
+    "env_specular",
+    "env_sheen",
+    "lut_ggx",
+    "lut_charlie",
+    "hdr_color",
+    "env_sampler",
+    "lut_sampler",
+];
 
 /// The group of a uniform value.
 pub fn group_of_member(name: &str) -> Group {
