@@ -5,6 +5,7 @@
 //! neighbours that a trilinear lookup touches, without gaps. Base size and law never depend on it.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use kiln_bake::RoughnessLaw;
 use kiln_scene::{Effect, EffectSet, LightReads, MaterialEffects};
@@ -25,8 +26,33 @@ pub struct SceneDemand {
     pub materials: Vec<MaterialEffects>,
 }
 
-/// Why something is made, a sentence for each reader; empty if nothing reads it.
-pub type Reasons = Vec<String>;
+/// Something that wants a map or a level made.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Reason {
+    /// A material is lit by it.
+    Material {
+        /// The scene.
+        scene: String,
+        /// The material.
+        material: String,
+        /// What of its values decides.
+        values: String,
+    },
+    /// kiln.toml says so, or what else a sentence says.
+    Said(String),
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Reason::Material { scene, material, values } => write!(f, "scene/{scene}: {material}, {values}"),
+            Reason::Said(sentence) => f.write_str(sentence),
+        }
+    }
+}
+
+/// Why something is made; empty if nothing reads it.
+pub type Reasons = Vec<Reason>;
 
 /// Which maps of an environment are read.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -97,7 +123,7 @@ fn env_demand(project: &Project, name: &str, env: &EnvConfig, scenes: &[SceneDem
     let mut demand =
         EnvDemand { light: Vec::new(), specular: vec![Vec::new(); count], sheen: vec![Vec::new(); count] };
     let every_level = |levels: &mut Vec<Reasons>, reason: &str| {
-        levels.iter_mut().for_each(|level| level.push(reason.into()))
+        levels.iter_mut().for_each(|level| level.push(said(reason)))
     };
     if env.has_sheen {
         every_level(&mut demand.sheen, "`sheen = true`");
@@ -109,31 +135,34 @@ fn env_demand(project: &Project, name: &str, env: &EnvConfig, scenes: &[SceneDem
         (false, true) => None,
     };
     if let Some(reason) = all {
-        demand.light.push(reason.to_owned());
+        demand.light.push(said(reason));
         every_level(&mut demand.specular, reason);
     }
     if env.background_blur > 0.0 {
-        let reason = format!("`background_blur = {}`", env.background_blur);
+        let reason = said(&format!("`background_blur = {}`", env.background_blur));
         for level in read_levels(env, [0.0, env.background_blur]) {
             demand.specular[level].push(reason.clone());
         }
     }
     for scene in scenes.iter().filter(|scene| scene.env == name) {
         for material in &scene.materials {
-            let who = format!("scene/{}: {}", scene.name, material.material);
+            let reason = |values: String| Reason::Material {
+                scene: scene.name.clone(),
+                material: material.material.clone(),
+                values,
+            };
             if let Some([low, high]) = material.reads.ggx.map(|interval| interval.map(f64::from)) {
-                demand.light.push(who.clone());
+                demand.light.push(reason("lit".to_owned()));
                 let widest = filtered(high);
-                let reason =
-                    format!("{who}, {}, filtered up to {widest:.2}", interval_text("roughness", low, high));
+                let values = format!("{}, filtered up to {widest:.2}", interval_text("roughness", low, high));
                 for level in read_levels(env, [low, widest]) {
-                    demand.specular[level].push(reason.clone());
+                    demand.specular[level].push(reason(values.clone()));
                 }
             }
             if let Some([low, high]) = material.reads.charlie.map(|interval| interval.map(f64::from)) {
-                let reason = format!("{who}, {}", interval_text("sheen roughness", low, high));
+                let values = interval_text("sheen roughness", low, high);
                 for level in read_levels(env, [low, high]) {
-                    demand.sheen[level].push(reason.clone());
+                    demand.sheen[level].push(reason(values.clone()));
                 }
             }
         }
@@ -150,9 +179,13 @@ fn close_gaps(chain: &mut [Reasons]) {
     };
     for level in &mut chain[first..=last] {
         if level.is_empty() {
-            level.push("it lies between levels that are read".to_owned());
+            level.push(said("it lies between levels that are read"));
         }
     }
+}
+
+fn said(sentence: &str) -> Reason {
+    Reason::Said(sentence.to_owned())
 }
 
 fn interval_text(what: &str, low: f64, high: f64) -> String {

@@ -68,6 +68,13 @@ pub struct SceneSummary {
     pub bounds: Option<[[f32; 3]; 2]>,
 }
 
+impl MaterialEffects {
+    /// Name of the shader variant that it is drawn with.
+    pub fn variant_name(&self) -> String {
+        crate::variant_name(&self.effects)
+    }
+}
+
 impl Packed {
     /// All effects that any material calls for.
     pub fn all_effects(&self) -> EffectSet {

@@ -38,8 +38,8 @@ pub(crate) enum Command {
     /// Check, reflect and emit shaders, of a project or of none
     #[command(subcommand)]
     Shader(ShaderCommand),
-    /// Say what a bake would run, and why, without running it
-    Plan(ReadArgs),
+    /// Say what scenes call for, what is made of it and what is left out, and what a bake would run, without running it
+    Plan(PlanArgs),
     /// Explain a target: what changed when, with old and new values, and why the rest was left alone
     Why(WhyArgs),
     /// Draw sources, actions and targets as DOT or SVG
@@ -213,6 +213,19 @@ pub(crate) struct ExportArgs {
     pub(crate) format: Option<String>,
     #[command(flatten)]
     pub(crate) run: RunArgs,
+}
+
+#[derive(Debug, ClapArgs)]
+pub(crate) struct PlanArgs {
+    /// The project's folder
+    #[arg(default_value = ".")]
+    pub(crate) dir: PathBuf,
+    /// Print JSON instead of text
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Also draw materials, effects and what is made of them to this file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) svg: Option<PathBuf>,
 }
 
 /// For commands that only read.

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use kiln_build::{ActionId, Forecast, Input};
-use kiln_project::{PartSpec, Plan};
+use kiln_project::{PartSpec, Plan, Reason, Skipped};
 
 /// Sizes of the SVG, in pixels.
 const ROW: usize = 26;
@@ -29,6 +29,9 @@ enum Kind {
     MayRun,
     Faulty,
     Target,
+    Material,
+    Effect,
+    Skipped,
 }
 
 impl Kind {
@@ -42,6 +45,9 @@ impl Kind {
             Kind::MayRun => ("#fff3d6", "#c2a00c"),
             Kind::Faulty => ("#fbd3cd", "#b42318"),
             Kind::Target => ("#dfe9f7", "#46699c"),
+            Kind::Material => ("#f4f1ea", "#8a8171"),
+            Kind::Effect => ("#fff3d6", "#c2a00c"),
+            Kind::Skipped => ("#fff", "#b9b4aa"),
         }
     }
 
@@ -54,6 +60,9 @@ impl Kind {
             Kind::MayRun => "may run",
             Kind::Faulty => "at fault",
             Kind::Target => "target",
+            Kind::Material => "material",
+            Kind::Effect => "effects",
+            Kind::Skipped => "skipped: nothing reads it",
         }
     }
 }
@@ -111,6 +120,46 @@ impl Picture {
             }
         }
         picture.assign_columns();
+        picture
+    }
+
+    /// Materials, the effects that they call for, and the maps, levels and variants that follow; what is left out stands
+    /// below.
+    pub(crate) fn of_demand(plan: &Plan, skipped: &[Skipped]) -> Picture {
+        let mut picture = Picture { nodes: Vec::new() };
+        let mut materials: BTreeMap<(String, String), usize> = BTreeMap::new();
+        let mut variants: BTreeMap<String, usize> = BTreeMap::new();
+        for scene in &plan.scenes {
+            for material in &scene.materials {
+                let label = format!("scene/{}: {}", scene.name, material.material);
+                let from = picture.add(label, Kind::Material);
+                materials.insert((scene.name.clone(), material.material.clone()), from);
+                let name = material.variant_name();
+                let effects = *variants.entry(format!("{} {name}", scene.shader)).or_insert_with(|| {
+                    let effects = picture.add(name.clone(), Kind::Effect);
+                    let variant = picture.add(format!("shader/{}/{name}", scene.shader), Kind::Target);
+                    picture.nodes[variant].reads.insert(effects);
+                    effects
+                });
+                picture.nodes[effects].reads.insert(from);
+            }
+        }
+        for (what, reasons) in kiln_project::made(plan) {
+            let made = picture.add(what, Kind::Target);
+            let readers = reasons.iter().filter_map(|reason| match reason {
+                Reason::Material { scene, material, .. } => {
+                    materials.get(&(scene.clone(), material.clone())).copied()
+                }
+                Reason::Said(_) => None,
+            });
+            picture.nodes[made].reads = readers.collect();
+        }
+        picture.assign_columns();
+        let last = picture.nodes.iter().map(|node| node.column).max().unwrap_or(0);
+        for skipped in skipped {
+            let skipped = picture.add(skipped.what.clone(), Kind::Skipped);
+            picture.nodes[skipped].column = last;
+        }
         picture
     }
 
@@ -212,6 +261,9 @@ impl Picture {
             Kind::MayRun,
             Kind::Faulty,
             Kind::Target,
+            Kind::Material,
+            Kind::Effect,
+            Kind::Skipped,
         ];
         let mut x = MARGIN;
         for kind in kinds.into_iter().filter(|kind| self.nodes.iter().any(|node| node.kind == *kind)) {
@@ -253,7 +305,11 @@ impl Picture {
 fn draw_box(svg: &mut String, x: usize, y: usize, width: usize, kind: Kind, label: &str) {
     let (fill, border) = kind.colours();
     let label = label.replace('&', "&amp;").replace('<', "&lt;");
-    let dash = if kind == (Kind::Source { is_missing: true }) { " stroke-dasharray=\"4 3\"" } else { "" };
+    let dash = if matches!(kind, Kind::Source { is_missing: true } | Kind::Skipped) {
+        " stroke-dasharray=\"4 3\""
+    } else {
+        ""
+    };
     let _ = writeln!(
         svg,
         "<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{BOX}\" rx=\"4\" fill=\"{fill}\" stroke=\"{border}\"{dash}/>\

@@ -1,4 +1,4 @@
-//! `kiln plan`: what a bake would do.
+//! `kiln plan`: what scenes call for, and what a bake would do.
 
 use std::process::ExitCode;
 
@@ -8,11 +8,13 @@ use kiln_diagnostic::has_errors;
 use kiln_project::with_values;
 use serde_json::json;
 
-use crate::args::ReadArgs;
+use crate::args::PlanArgs;
+use crate::commands::demand;
 use crate::out::say;
+use crate::picture::Picture;
 use crate::{INPUT_IS_WRONG, place, report};
 
-pub(crate) fn run(args: &ReadArgs) -> anyhow::Result<ExitCode> {
+pub(crate) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
     let start = std::time::Instant::now();
     let engine = place::open_engine(&args.dir)?;
     let _hold = engine.store().hold();
@@ -21,6 +23,11 @@ pub(crate) fn run(args: &ReadArgs) -> anyhow::Result<ExitCode> {
     // What was hashed for this need not be hashed again.
     engine.save_memory().context("remembering the sources")?;
     let plan_ms = start.elapsed().as_secs_f64() * 1e3;
+    if let Some(path) = &args.svg {
+        let svg = Picture::of_demand(&plan, &kiln_project::skipped(&engine, &plan)).to_svg();
+        kiln_build::write_atomically(&kiln_build::Disk, path, svg.as_bytes())
+            .context("writing the picture")?;
+    }
     let actions = || plan.graph.iter().map(|(_, action)| action.name.as_str()).zip(&forecasts);
     if args.json {
         let actions: Vec<_> = actions().map(|(name, forecast)| to_json(name, forecast)).collect();
@@ -28,9 +35,13 @@ pub(crate) fn run(args: &ReadArgs) -> anyhow::Result<ExitCode> {
         let sources =
             json!({"looked_at": engine.sources().looked_at().len(), "hashed": files, "hashed_bytes": bytes});
         let targets: Vec<_> = plan.targets.iter().map(|target| &target.name).collect();
-        let plan = json!({"actions": actions, "targets": targets, "diagnostics": plan.diagnostics, "plan_ms": plan_ms, "sources": sources});
+        let demand = demand::to_json(&engine, &plan);
+        let plan = json!({"demand": demand, "actions": actions, "targets": targets, "diagnostics": plan.diagnostics, "plan_ms": plan_ms, "sources": sources});
         say!("{plan:#}");
     } else {
+        if !plan.scenes.is_empty() {
+            demand::print(&engine, &plan);
+        }
         let mut expected_ms = 0.0;
         for (name, forecast) in actions() {
             if let Forecast::Runs { last_ms, .. } | Forecast::MayRun { last_ms, .. } = forecast {
