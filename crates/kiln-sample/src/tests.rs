@@ -41,7 +41,7 @@ fn scene_packs_without_a_word_and_calls_for_each_effect_once() {
         ("ground", "base"),
     ];
     assert_eq!(variants, expected);
-    let car_paint = packed.effects[1].roughness;
+    let car_paint = packed.effects[1].reads.ggx.unwrap();
     assert_eq!(car_paint, [0.03, 0.5]);
 }
 
