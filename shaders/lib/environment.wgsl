@@ -1,7 +1,7 @@
 // Light from the environment: prefiltered maps and the split sum.
 
-import lib::frame::{frame, env_irradiance, env_sampler, env_skybox, env_specular, lut_ggx, lut_sampler};
-@if(sheen) import lib::frame::{env_sheen, lut_charlie};
+import lib::frame::{frame, env_irradiance, env_sampler, env_sheen, env_skybox, env_specular};
+import lib::frame::{lut_charlie, lut_ggx, lut_sampler};
 
 // Lookup direction of a world direction; need not have unit length.
 fn environment_direction(direction: vec3f) -> vec3f {
@@ -27,17 +27,15 @@ fn specular_radiance(direction: vec3f, perceptual_roughness: f32) -> vec3f {
     return texel.rgb * (frame.specular_scale * frame.environment_intensity);
 }
 
-// Radiance convolved with the Charlie lobe of a perceptual roughness.
-@if(sheen)
+// Radiance convolved with the Charlie lobe of a perceptual roughness. Its chain has the scale of the other.
 fn sheen_radiance(direction: vec3f, perceptual_roughness: f32) -> vec3f {
-    let level = perceptual_roughness * frame.sheen_level_max;
+    let level = perceptual_roughness * f32(textureNumLevels(env_sheen) - 1u);
     let texel = textureSampleLevel(env_sheen, env_sampler, environment_direction(direction), level);
-    return texel.rgb * (frame.sheen_scale * frame.environment_intensity);
+    return texel.rgb * (frame.specular_scale * frame.environment_intensity);
 }
 
 // Directional albedo of the Charlie lobe. The model gives more light than it gets at grazing views of smooth fibres:
 // no more is taken from below than there is.
-@if(sheen)
 fn sheen_albedo(n_dot_v: f32, perceptual_roughness: f32) -> f32 {
     return min(textureSampleLevel(lut_charlie, lut_sampler, vec2f(n_dot_v, perceptual_roughness), 0.0).r, 1.0);
 }

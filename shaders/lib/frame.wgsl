@@ -11,8 +11,6 @@ struct Frame {
     skybox_scale: f32,
     irradiance_scale: f32,
     specular_scale: f32,
-    @if(sheen) sheen_level_max: f32,
-    @if(sheen) sheen_scale: f32,
     background_blur: f32,
 }
 
@@ -24,5 +22,5 @@ struct Frame {
 @group(0) @binding(5) var env_sampler: sampler;
 @group(0) @binding(6) var lut_sampler: sampler;
 @group(0) @binding(7) var hdr_color: texture_2d<f32>;
-@if(sheen) @group(0) @binding(8) var env_sheen: texture_cube<f32>;
-@if(sheen) @group(0) @binding(9) var lut_charlie: texture_2d<f32>;
+@group(0) @binding(8) var env_sheen: texture_cube<f32>;
+@group(0) @binding(9) var lut_charlie: texture_2d<f32>;

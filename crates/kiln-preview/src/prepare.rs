@@ -162,9 +162,20 @@ impl Preparer {
             Some(env) => self.cube(revision, &format!("env/{env}/{map}"), report),
             None => Arc::clone(&self.neutral_cube),
         };
-        let [skybox, irradiance, specular, sheen] =
-            ["skybox", "irradiance", "specular", "sheen"].map(&mut cube);
-        let [lut_ggx, lut_charlie] = ["lut/ggx", "lut/charlie"].map(|name| self.lut(revision, name, report));
+        let [skybox, irradiance, specular] = ["skybox", "irradiance", "specular"].map(&mut cube);
+        // Only cloth reads it, and what keeps it from being made is said where that happens.
+        let sheen = env.map(|env| format!("env/{env}/sheen"));
+        let sheen = sheen.filter(|name| revision.table.targets.contains_key(name));
+        let sheen = sheen.map(|name| self.cube(revision, &name, report));
+        let sheen = sheen.unwrap_or_else(|| Arc::clone(&self.neutral_cube));
+        if sheen.levels > 1 && sheen.scale.to_bits() != specular.scale.to_bits() {
+            report.notes.push("sheen is shown too bright or too dark: its map has another scale".to_owned());
+        }
+        let lut_ggx = self.lut(revision, "lut/ggx", report);
+        let lut_charlie = match revision.table.targets.contains_key("lut/charlie") {
+            true => self.lut(revision, "lut/charlie", report),
+            false => Arc::clone(&self.neutral_lut),
+        };
         let sampler = self.sampler.clone();
         Environment { skybox, irradiance, specular, sheen, lut_ggx, lut_charlie, sampler }
     }

@@ -124,8 +124,6 @@ impl Renderer {
             skybox_scale: environment.skybox.scale,
             irradiance_scale: environment.irradiance.scale,
             specular_scale: environment.specular.scale,
-            sheen_level_max: (environment.sheen.levels - 1) as f32,
-            sheen_scale: environment.sheen.scale,
             background_blur: environment.specular.nearest_roughness(view.background_blur),
             viewport_size: self.picture.size.map(|pixels| pixels as f32),
             time_s: view.time_s,

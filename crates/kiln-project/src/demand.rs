@@ -24,6 +24,8 @@ pub struct SceneDemand {
     pub shader: String,
     /// Its materials, after `[effects]`.
     pub materials: Vec<MaterialEffects>,
+    /// Whether they are known: a scene that could never be read may need anything.
+    pub is_known: bool,
 }
 
 /// Something that wants a map or a level made.
@@ -129,14 +131,16 @@ fn env_demand(project: &Project, name: &str, env: &EnvConfig, scenes: &[SceneDem
         every_level(&mut demand.sheen, "`sheen = true`");
     }
     let is_used = project.scenes.values().any(|scene| scene.env == name);
-    let all = match (env.bakes_all, is_used) {
-        (true, _) => Some("`bake = \"all\"`"),
-        (false, false) => Some("no scene is lit by it, so none says what it needs"),
-        (false, true) => None,
+    let unknown = scenes.iter().find(|scene| scene.env == name && !scene.is_known);
+    let all = match (env.bakes_all, is_used, unknown) {
+        (true, ..) => Some("`bake = \"all\"`".to_owned()),
+        (_, false, _) => Some("no scene is lit by it, so none says what it needs".to_owned()),
+        (.., Some(scene)) => Some(format!("what scene/{} needs is not known", scene.name)),
+        (false, true, None) => None,
     };
     if let Some(reason) = all {
-        demand.light.push(said(reason));
-        every_level(&mut demand.specular, reason);
+        demand.light.push(said(&reason));
+        every_level(&mut demand.specular, &reason);
     }
     if env.background_blur > 0.0 {
         let reason = said(&format!("`background_blur = {}`", env.background_blur));

@@ -207,10 +207,9 @@ pub(crate) fn plan_project(
 
 /// Maps and tables of the preview's shaders that are not made because nothing reads them.
 fn unread_targets(envs: &BTreeMap<String, EnvDemand>, made: &[TargetSpec]) -> Vec<String> {
-    let maps = ["irradiance", "specular", "sheen"];
+    let maps = ["irradiance", "specular"];
     let of_env = |name: &String| maps.map(|map| format!("env/{name}/{map}"));
-    let tables = ["lut/ggx", "lut/charlie"].map(str::to_owned);
-    let names = envs.keys().flat_map(of_env).chain(tables);
+    let names = envs.keys().flat_map(of_env).chain(["lut/ggx".to_owned()]);
     names.filter(|name| !made.iter().any(|target| target.name == *name)).collect()
 }
 

@@ -37,9 +37,10 @@ pub(crate) fn plan_scene(
         engine.scan("scene", PACK_RECIPE, &config.source, |tracker| scan_scene(&config.source, tracker))?;
     let found = SceneScan::deserialize(&scan.found).unwrap_or_default();
     // While a scene cannot be read, what it last called for stays.
-    let materials = found.materials.or_else(|| last_materials(engine, name)).unwrap_or_default();
+    let materials = found.materials.or_else(|| last_materials(engine, name));
+    let is_known = materials.is_some();
     let materials: Vec<MaterialEffects> =
-        materials.iter().map(|material| overrides.apply_to(material)).collect();
+        materials.iter().flatten().map(|material| overrides.apply_to(material)).collect();
     for material in &materials {
         let features = material.effects.iter().map(|effect| effect.name().to_owned());
         variants.ask(&config.shader, features.collect());
@@ -76,7 +77,7 @@ pub(crate) fn plan_scene(
     let parts = vec![PartSpec::one(pack, "glb"), PartSpec::one(pack, "effects")];
     planner.target(format!("scene/{name}"), "scene", meta, parts);
     let (env, shader) = (config.env.clone(), config.shader.clone());
-    Ok(SceneDemand { name: name.to_owned(), env, shader, materials })
+    Ok(SceneDemand { name: name.to_owned(), env, shader, materials, is_known })
 }
 
 /// The materials of what was published last of a scene.

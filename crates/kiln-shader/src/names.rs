@@ -39,7 +39,7 @@ impl Group {
 }
 
 /// Members of the uniform `frame`.
-pub const FRAME_MEMBERS: [&str; 15] = [
+pub const FRAME_MEMBERS: [&str; 13] = [
     "clip_from_world",
     "world_from_clip",
     "camera_position",
@@ -50,8 +50,6 @@ pub const FRAME_MEMBERS: [&str; 15] = [
     "skybox_scale",
     "irradiance_scale",
     "specular_scale",
-    "sheen_level_max",
-    "sheen_scale",
     "background_blur",
     "viewport_size",
     "time_s",

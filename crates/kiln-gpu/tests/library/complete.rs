@@ -5,11 +5,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::support::repository;
 
 /// Read textures or derivatives, and are seen in the golden frames instead.
-const SEEN_IN_FRAMES: [&str; 6] = [
+const SEEN_IN_FRAMES: [&str; 8] = [
     "alpha2_filtered",
     "environment_direction",
     "ggx_scale_bias",
     "irradiance_over_pi",
+    "sheen_albedo",
+    "sheen_radiance",
     "skybox_radiance",
     "specular_radiance",
 ];
