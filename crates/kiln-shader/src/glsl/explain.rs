@@ -9,7 +9,7 @@ use super::declare::Item;
 use super::source::{Mapped, Sources};
 use crate::explain::Finding;
 use crate::front::Fault;
-use crate::suggest;
+use crate::{suggest, writable};
 
 /// A diagnostic for what naga found in the text of a stage.
 pub fn of_stage(
@@ -73,6 +73,8 @@ fn help(
         return Some("use `vec4`, or a matrix of 3 or 4 rows".to_owned());
     } else if message.starts_with("textures of integers") {
         return Some("read them with `texelFetch`".to_owned());
+    } else if message.ends_with(writable::ENDING) {
+        return Some("compute it in a function, or from macros".to_owned());
     } else {
         None
     };

@@ -13,7 +13,7 @@ use super::{inout, layout, lower, stage, stride};
 use crate::explain::Finding;
 use crate::front::{self, Fault};
 use crate::lint::{self, Warning};
-use crate::{Stage, canonical, describe};
+use crate::{Stage, canonical, describe, writable};
 
 /// What naga made of a stage, or what is wrong.
 pub type Made = Result<Translated, Vec<Finding>>;
@@ -78,6 +78,9 @@ fn run(lowered: &Lowered, stage: Stage, names: &Names, lints: bool) -> Result<Ma
         return Ok(Err(vec![finding]));
     }
     let info = front::strip(&mut module)?;
+    if let Err(finding) = writable::check(&module) {
+        return Ok(Err(vec![finding]));
+    }
     let warnings = if lints { lint::check(&module, &info) } else { Vec::new() };
     let wgsl = canonical::emit(&module, &info).map_err(Fault::Internal)?;
     let functions = source_map::functions(&module, &wgsl);

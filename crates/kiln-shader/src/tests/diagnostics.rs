@@ -440,3 +440,39 @@ fn types_that_do_not_go_together_are_named_as_their_author_writes_them() {
     let actual = expected.map(|(statement, _)| (statement, message(statement)));
     assert_eq!(actual, expected.map(|(statement, expected)| (statement, expected.to_owned())));
 }
+
+#[test]
+fn what_depends_on_overrides_outside_of_functions_is_refused_by_name_and_place() {
+    let said = |declarations: &str, attribute: &str, statement: &str| {
+        let text = format!(
+            "override n: u32 = 8u;\n{declarations}\n{attribute} fn main() {{ {statement} }}\n@group(0) @binding(0) var<storage, read_write> out: array<u32>;"
+        );
+        let outcome = Files::new(&[("a.wgsl", &text)]).compile("a.wgsl", &[]);
+        let found = outcome.diagnostics.first().map(|found| {
+            let span = found.span.as_ref().unwrap();
+            assert!(found.help.is_some());
+            format!("{}:{} {}", span.line, span.column, found.message)
+        });
+        found.unwrap_or_default()
+    };
+    let plain = "@compute @workgroup_size(1)";
+    let ending = "an override, which only functions may do";
+    for (declarations, attribute, statement, expected) in [
+        ("override b: u32 = 4u / n;", plain, "out[0] = b;", "2:19 the default value of `b` computes with"),
+        (
+            "var<private> p: u32 = n * 2u;",
+            plain,
+            "out[0] = p;",
+            "2:23 the initial value of `p` computes with",
+        ),
+        ("var<workgroup> w: array<u32, n>;", plain, "out[0] = w[1];", "2:1 the length of `w` depends on"),
+        ("var<workgroup> w: array<u32, n * 2>;", plain, "out[0] = w[1];", "2:1 the length of `w` depends on"),
+        ("", "@compute @workgroup_size(4, n)", "", "3:29 the workgroup size of `main` depends on"),
+    ] {
+        let found = said(declarations, attribute, statement);
+        assert_eq!(found, format!("{expected} {ending}"), "{declarations}");
+    }
+    // The twins: what is plain, and what nobody uses.
+    assert_eq!(said("override b: u32 = n; var<private> p: u32 = n;", plain, "out[0] = 4u / b + p;"), "");
+    assert_eq!(said("override b: u32 = 4u / n;", plain, ""), "");
+}
