@@ -41,7 +41,7 @@ pub struct Rewriter<'a, 's, 'r> {
     /// What is called by each open parenthesis.
     pub(super) calls: Vec<Option<Rc<str>>>,
     /// Text before a token.
-    before: BTreeMap<usize, Vec<Token>>,
+    pub(super) before: BTreeMap<usize, Vec<Token>>,
     /// Text in place of a token.
     pub(super) instead: BTreeMap<usize, Vec<Token>>,
     result: Option<Rc<str>>,
@@ -369,6 +369,7 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
             self.scene.polyfills.entry(function).or_insert(token.place);
             name.insert_str(0, "kiln_");
         }
+        self.round_layer(tokens, &name, at + 2, close);
         if let Some(selected) = self.selected(tokens, &name, at + 2, close) {
             name = selected;
         }

@@ -158,6 +158,37 @@ impl Rewriter<'_, '_, '_> {
         texture_array::value(tokens, &self.scene.constants).filter(|_| !hidden)
     }
 
+    /// Rounds the layer among the coordinates of the lookup `name`, whose arguments stand at `first..close`: naga cuts its
+    /// fraction off.
+    pub(super) fn round_layer(&mut self, tokens: &[Token], name: &str, first: usize, close: usize) {
+        if !texture_array::has_layer(name) {
+            return;
+        }
+        let word = &tokens[first].text;
+        let meaning = || match self.scene.meanings.get(&**word) {
+            Some(Meaning::Texture(combined, _) | Meaning::Textures(combined, _)) => Some(combined.clone()),
+            _ => builtin::combined(word),
+        };
+        let combined = match self.local(word) {
+            Some(Local::Texture(combined, _) | Local::Textures(combined, _)) => Some(combined.clone()),
+            Some(Local::Value(_)) => None,
+            None => meaning(),
+        };
+        let function = match combined.as_ref().and_then(|combined| combined.texture.split_once("texture")) {
+            Some((_, "2DArray")) => "layer",
+            Some((_, "CubeArray")) => "cube_layer",
+            _ => return,
+        };
+        let arguments = lex::split_commas(&tokens[first..close]);
+        let [texture, coordinates, ..] = arguments[..] else { return };
+        let place = tokens[first].place;
+        let start = first + texture.len() + 1;
+        self.scene.polyfills.entry(function).or_insert(place);
+        let written = format!("kiln_{function}");
+        self.before.entry(start).or_default().extend(tokens_of(&[&written, "("], place));
+        self.close(start + coordinates.len(), &[")"], place);
+    }
+
     /// The function to call instead of `name`, if the texture at `at` is an element whose index is not constant: it
     /// takes all elements and the index. `close` is the end of the call.
     pub(super) fn selected(

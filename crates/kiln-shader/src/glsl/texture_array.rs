@@ -178,6 +178,11 @@ impl Lookup<'_> {
     }
 }
 
+/// Whether the lookup `name` takes a layer, if there are some, as a number with a fraction.
+pub fn has_layer(name: &str) -> bool {
+    Lookup::of(name).is_some_and(|lookup| ["texture", "textureLod", "textureGrad"].contains(&lookup.name))
+}
+
 /// Which argument of the lookup `name` is its offset, if one is, counted from the texture's 0.
 pub fn offset_argument(name: &str) -> Option<usize> {
     let lookup = Lookup::of(name).filter(|lookup| lookup.has_offset)?;
