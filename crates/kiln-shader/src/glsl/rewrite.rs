@@ -360,7 +360,8 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
         }
         let mut name = modern.map_or(&*token.text, |modern| modern).to_owned();
         let count = lex::split_commas(&tokens[at + 2..close]).len();
-        let levelled = builtin::with_level(&name).filter(|(_, wanted)| *wanted == count);
+        let is_shadow = self.is_comparison(tokens, &name, at + 2, close);
+        let levelled = builtin::with_level(&name).filter(|(_, wanted)| *wanted == count && !is_shadow);
         if let Some((with_level, _)) = levelled.filter(|_| self.scene.stage != Stage::Fragment) {
             name = with_level.to_owned();
             self.before.entry(close).or_default().extend(tokens_of(&[",", "0.0"], token.place));

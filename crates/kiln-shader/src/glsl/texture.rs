@@ -158,22 +158,49 @@ impl Rewriter<'_, '_, '_> {
         texture_array::value(tokens, &self.scene.constants).filter(|_| !hidden)
     }
 
+    /// The combined texture that an argument names, or makes, if it begins with `word`.
+    pub(super) fn combined(&self, word: &str) -> Option<Combined> {
+        match self.local(word) {
+            Some(Local::Texture(combined, _) | Local::Textures(combined, _)) => Some(combined.clone()),
+            Some(Local::Value(_)) => None,
+            None => match self.scene.meanings.get(word) {
+                Some(Meaning::Texture(combined, _) | Meaning::Textures(combined, _)) => {
+                    Some(combined.clone())
+                }
+                _ => builtin::combined(word),
+            },
+        }
+    }
+
+    /// Whether the lookup `name`, whose arguments stand at `first..close`, compares with a reference: WGSL has that at the first
+    /// level or at one of its own choice.
+    pub(super) fn is_comparison(&mut self, tokens: &[Token], name: &str, first: usize, close: usize) -> bool {
+        let combined = tokens.get(first).and_then(|word| self.combined(&word.text));
+        if combined.is_none_or(|combined| combined.sampler != "samplerShadow") {
+            return false;
+        }
+        let arguments = lex::split_commas(&tokens[first..close]);
+        let is_first = |level: &[Token]| matches!(level, [number] if number.text.trim_end_matches(['f', 'F']).parse() == Ok(0.0_f32));
+        let chooses = match texture_array::lookup(name) {
+            Some("textureLod") => arguments.get(2).is_some_and(|level| !is_first(level)),
+            lookup => lookup == Some("textureGrad"),
+        };
+        if chooses {
+            let message = format!("`{name}` of a shadow sampler reads level 0");
+            let help = "shadow maps with levels cannot be compared at a chosen one: write `0.0`, or `texture` in a fragment stage";
+            let warning = self.sources.warning(tokens[first].place, message).with_help(help);
+            self.sources.diagnostics.push(warning);
+        }
+        true
+    }
+
     /// Rounds the layer among the coordinates of the lookup `name`, whose arguments stand at `first..close`: naga cuts its
     /// fraction off.
     pub(super) fn round_layer(&mut self, tokens: &[Token], name: &str, first: usize, close: usize) {
-        if !texture_array::has_layer(name) {
+        if !["texture", "textureLod", "textureGrad"].map(Some).contains(&texture_array::lookup(name)) {
             return;
         }
-        let word = &tokens[first].text;
-        let meaning = || match self.scene.meanings.get(&**word) {
-            Some(Meaning::Texture(combined, _) | Meaning::Textures(combined, _)) => Some(combined.clone()),
-            _ => builtin::combined(word),
-        };
-        let combined = match self.local(word) {
-            Some(Local::Texture(combined, _) | Local::Textures(combined, _)) => Some(combined.clone()),
-            Some(Local::Value(_)) => None,
-            None => meaning(),
-        };
+        let combined = self.combined(&tokens[first].text);
         let function = match combined.as_ref().and_then(|combined| combined.texture.split_once("texture")) {
             Some((_, "2DArray")) => "layer",
             Some((_, "CubeArray")) => "cube_layer",

@@ -178,9 +178,9 @@ impl Lookup<'_> {
     }
 }
 
-/// Whether the lookup `name` takes a layer, if there are some, as a number with a fraction.
-pub fn has_layer(name: &str) -> bool {
-    Lookup::of(name).is_some_and(|lookup| ["texture", "textureLod", "textureGrad"].contains(&lookup.name))
+/// The lookup that `name` is, without `Offset` and `Proj`.
+pub fn lookup(name: &str) -> Option<&str> {
+    Lookup::of(name).map(|lookup| lookup.name)
 }
 
 /// Which argument of the lookup `name` is its offset, if one is, counted from the texture's 0.
