@@ -418,6 +418,45 @@ fn what_only_follows_from_a_broken_declaration_is_not_reported() {
 }
 
 #[test]
+fn assertion_hides_no_fault_of_another_module() {
+    let root = "import b::LIMIT;\nfn own() -> f32 { return 1u; }\n@fragment fn fs_main() -> @location(0) vec4f { return vec4f(LIMIT); }";
+    let places = |b: &str| -> Vec<String> {
+        let outcome = Files::new(&[("a.wgsl", root), ("b.wgsl", b)]).compile("a.wgsl", &[]);
+        outcome.diagnostics.into_iter().map(|found| found.file.unwrap()).collect()
+    };
+    assert_eq!(places("const LIMIT = oops;\nconst_assert LIMIT > 2.0;"), ["a.wgsl", "b.wgsl"]);
+    assert_eq!(places("const LIMIT = 1.0;\nconst_assert LIMIT > 2.0;"), ["a.wgsl", "b.wgsl"]);
+    assert_eq!(places("const LIMIT = 3.0;\nconst_assert LIMIT > 2.0;"), ["a.wgsl"]);
+}
+
+#[test]
+fn module_that_ends_within_a_declaration_is_named_and_not_the_one_behind_it() {
+    let root = "import b::LIMIT;\nfn own() -> f32 { return LIMIT; }\n@fragment fn fs_main() -> @location(0) vec4f { return vec4f(own()); }";
+    let said = |end: &str| {
+        let b = format!("const LIMIT: f32 = 1.0; // first\n{end}");
+        let outcome = Files::new(&[("a.wgsl", root), ("b.wgsl", &b)]).compile("a.wgsl", &[]);
+        let said = outcome.diagnostics.into_iter().map(|found| {
+            let span = found.span.unwrap();
+            format!("{} {}:{} {}", found.file.unwrap(), span.line, span.column, found.message)
+        });
+        said.collect::<Vec<String>>().join("\n")
+    };
+    for (end, column) in [
+        ("const A = 1.0", 11),
+        ("fn f() -> f32", 11),
+        ("@fragment", 2),
+        ("@group(0) @binding(1) var<uniform> x: vec4f // last", 39),
+        ("struct", 1),
+        ("const_assert", 1),
+    ] {
+        assert_eq!(said(end), format!("b.wgsl 2:{column} this module ends within a declaration"), "{end}");
+    }
+    for end in ["", "const A = 1.0;", "fn f() { }", "struct S { x: f32 };", "const_assert true;"] {
+        assert_eq!(said(end), "", "{end}");
+    }
+}
+
+#[test]
 fn types_that_do_not_go_together_are_named_as_their_author_writes_them() {
     let message = |statement: &str| {
         let text = format!(
