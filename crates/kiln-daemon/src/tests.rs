@@ -83,6 +83,26 @@ fn readers_of_a_saved_file_keep_nobody_waiting() {
 }
 
 #[test]
+fn file_that_is_written_without_a_pause_is_built_all_the_same() {
+    let (sender, events) = channel();
+    sender.send(()).unwrap();
+    // The next event is there before this one is looked at, as long as nothing was built.
+    let sender = Mutex::new(Some(sender));
+    let given_up = Instant::now() + LIMIT;
+    let name = |_: &()| {
+        if let Some(sender) = &*sender.lock().unwrap()
+            && Instant::now() < given_up
+        {
+            sender.send(()).unwrap();
+        }
+        names(&["a"])
+    };
+    let settled = |_| drop(sender.lock().unwrap().take());
+    settle(&events, &settled, name, |_| false);
+    assert!(Instant::now() < given_up, "writing went on until nothing more was written");
+}
+
+#[test]
 fn merged_batch_keeps_the_earliest_time() {
     let batch = |files: &[&str], noticed_unix_ms| Batch { files: names(files), noticed_unix_ms };
     let mut merged = Batch::default();

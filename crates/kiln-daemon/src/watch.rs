@@ -219,7 +219,11 @@ pub(crate) fn settle<E>(
         loop {
             let now = Instant::now();
             gathering.add(name(&event), ends_save(&event), now);
-            event = match events.recv_timeout(gathering.end.saturating_duration_since(now)) {
+            // More may be queued for ever: a batch ends all the same, and one about nothing has not begun.
+            if gathering.end <= now {
+                break;
+            }
+            event = match events.recv_timeout(gathering.end - now) {
                 Ok(event) => event,
                 Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => break,
             };

@@ -6,8 +6,8 @@
 //! Names inside functions matter to nobody outside: they are numbered, so that renaming one changes nothing.
 //! [`crate::SourceMap`] has the author's.
 //!
-//! Canonical text compiles to itself, but where a `let` names a constant: naga's writer puts the constant where the name
-//! stood, and its parser then works out what it could not before.
+//! Canonical text compiles to itself. Where a `let` names a constant, naga's writer would put the constant where the name
+//! stood, and its parser then works out what is not constant in WGSL, or refuses it: `1f / 0f`. So it is told to write the `let`.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,7 +15,7 @@ use naga::back::wgsl::WriterFlags;
 use naga::compact::{KeepUnused, compact};
 use naga::proc::{Alignment, Layouter};
 use naga::valid::ModuleInfo;
-use naga::{Expression, Module, StructMember, TypeInner, UniqueArena};
+use naga::{Block, Expression, Module, Range, Span, Statement, StructMember, TypeInner, UniqueArena};
 use rustc_hash::FxHashSet;
 
 use crate::token::{self, Kind, Token};
@@ -55,8 +55,11 @@ pub fn emit(module: &Module, info: &ModuleInfo) -> Result<String, String> {
     let mut module = module.clone();
     let kept = replace_names(&mut module)?;
     number_locals(&mut module);
+    write_named_constants(&mut module);
     let text = naga::back::wgsl::write_string(&module, info, WriterFlags::empty())
         .map_err(|error| format!("cannot write canonical WGSL: {error}"))?;
+    // Functions that the writer adds have names that it changes when it meets them again.
+    let text = text.replace("gen__naga_", "gen_naga_");
     restore_names(&number_values(&text)?, &kept)
 }
 
@@ -198,6 +201,25 @@ fn number_locals(module: &mut Module) {
         for name in function.named_expressions.values_mut() {
             "value".clone_into(name);
         }
+    }
+}
+
+/// Has the writer write a `let` for each constant that one names, at the function's beginning. No valid module says so: what
+/// needs no work is never emitted.
+fn write_named_constants(module: &mut Module) {
+    let functions = module.functions.iter_mut().map(|(_, function)| function);
+    for function in functions.chain(module.entry_points.iter_mut().map(|entry| &mut entry.function)) {
+        let is_constant = |expression: &Expression| {
+            matches!(expression, Expression::Literal(_) | Expression::Constant(_) | Expression::ZeroValue(_))
+        };
+        let named = function.named_expressions.keys().copied();
+        let mut named: Vec<_> = named.filter(|named| is_constant(&function.expressions[*named])).collect();
+        named.sort();
+        let mut lets = Block::with_capacity(named.len());
+        for constant in named {
+            lets.push(Statement::Emit(Range::new_from_bounds(constant, constant)), Span::UNDEFINED);
+        }
+        function.body.splice(0..0, lets);
     }
 }
 

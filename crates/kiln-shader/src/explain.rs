@@ -11,7 +11,7 @@ use crate::lenient::Lenient;
 use crate::link::Graph;
 use crate::lint::{Allowances, Warning};
 use crate::token::{self, Kind};
-use crate::{limits, suggest};
+use crate::{limits, suggest, writable};
 
 /// Bytes that the search for further faults has naga read, about: half a second of work.
 const SEARCH_BYTES_MAX: usize = 8 << 20;
@@ -152,6 +152,8 @@ impl Finder<'_> {
             Some(format!("a `;` may be missing at the end of line {line}"))
         } else if message.contains("`f16`") || text.get(range).is_some_and(|text| text.contains("f16")) {
             Some("Kiln compiles for devices without optional features: use `f32`".to_owned())
+        } else if message.ends_with(writable::ENDING) {
+            Some("compute it in a function, or from a `const` and features".to_owned())
         } else {
             None
         }

@@ -7,7 +7,7 @@ use naga::{Module, WithSpan};
 use crate::explain::Finding;
 use crate::lint::{self, Warning};
 use crate::source_map::{self, LinkedFunction};
-use crate::{Compiled, canonical, describe, interface, limits};
+use crate::{Compiled, canonical, describe, interface, limits, writable};
 
 /// Stack of the thread that naga runs on. Its front end, validator and writer recurse over expressions and
 /// blocks, whose depth `limits` bounds; `tests::deepest_allowed_*` runs the worst case on this stack.
@@ -131,6 +131,7 @@ struct Canonical {
 /// Strips, emits and reflects a valid module.
 fn canonical(module: &mut Module) -> Result<Canonical, Fault> {
     let info = strip(module)?;
+    writable::check(module).map_err(Fault::Source)?;
     let wgsl = canonical::emit(module, &info).map_err(Fault::Internal)?;
     let reparsed = naga::front::wgsl::parse_str(&wgsl).map_err(|error| reparse_fault(&error, &wgsl))?;
     let reflection = interface::reflect(module, &info, &reparsed).map_err(Fault::Internal)?;

@@ -113,14 +113,16 @@ fn declaration(linked: &Linked, tokens: &[Token]) -> Option<Declaration> {
     if names.as_slice().first().is_some_and(|token| token.is('<')) {
         names.find(|token| token.is('>'));
     }
-    let name = names.next().map(|token| text[token.range()].to_owned()).unwrap_or_default();
+    // An assertion has none: what follows is its condition.
+    let name = names.next().filter(|_| !tokens[keyword].is_word(text, "const_assert"));
+    let name = name.map(|token| text[token.range()].to_owned()).unwrap_or_default();
     let is_function = tokens[keyword].is_word(text, "fn");
     let body = tokens.iter().position(|token| token.is('{')).filter(|_| is_function);
     let body = body.map(|body| (tokens[body].start, result(&tokens[keyword..body])));
     Some(Declaration { range, module, name, body })
 }
 
-const KEYWORDS: [&str; 6] = ["fn", "struct", "const", "override", "alias", "var"];
+const KEYWORDS: [&str; 7] = ["fn", "struct", "const", "override", "alias", "var", "const_assert"];
 
 /// The type behind the arrow of a function's head, without attributes.
 fn result(head: &[Token]) -> Option<Range<usize>> {

@@ -48,6 +48,7 @@ mod suggest;
 mod tests;
 mod token;
 mod wgsl;
+mod writable;
 
 /// A file that was looked at. Missing ones count too, because their appearance changes the result.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]

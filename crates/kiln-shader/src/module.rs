@@ -110,12 +110,23 @@ pub fn outline(file: &str, text: &str, tokens: &[Token], diagnostics: &mut Vec<D
                 outline.declarations.extend(declared.map(|name| Declaration { name, is_public }));
                 parser.skip_declaration();
                 parser.collect_qualified(first, &mut outline.qualified);
+                if KEYWORDS.contains(&keyword) {
+                    diagnostics.extend(parser.check_end());
+                }
             }
-            None => parser.at += 1,
+            None => {
+                parser.at += 1;
+                if start > first {
+                    diagnostics.extend(parser.check_end());
+                }
+            }
         }
     }
     outline
 }
+
+/// What declarations begin with.
+const KEYWORDS: [&str; 7] = ["fn", "struct", "const", "override", "alias", "var", "const_assert"];
 
 struct Parser<'a> {
     file: &'a str,
@@ -231,6 +242,16 @@ impl<'a> Parser<'a> {
                 _ => self.at += 1,
             }
         }
+    }
+
+    /// What is wrong if the module ends within what was just skipped: linked, it would go on in the next module.
+    fn check_end(&self) -> Option<Diagnostic> {
+        let last = self.tokens.last().filter(|last| !(last.is(';') || last.is('}')))?;
+        (self.at >= self.tokens.len()).then(|| {
+            let fault = Diagnostic::error("this module ends within a declaration");
+            let fault = fault.at(self.file, self.text, last.range());
+            fault.with_help("a `;` or a body may be missing at its end")
+        })
     }
 
     fn declared_name(&self, keyword: &str) -> Option<Name> {

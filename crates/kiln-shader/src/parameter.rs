@@ -33,8 +33,13 @@ pub(crate) struct Annotation {
 
 const KINDS: [&str; 4] = ["slider", "color", "toggle", "choice"];
 
-/// The annotations of a file.
-pub(crate) fn annotations(path: &str, text: &str, diagnostics: &mut Vec<Diagnostic>) -> Vec<Annotation> {
+/// The annotations of a file that stand at a name whose bytes `is_kept` has: conditions cut others.
+pub(crate) fn annotations(
+    path: &str,
+    text: &str,
+    is_kept: impl Fn(Range<usize>) -> bool,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Vec<Annotation> {
     let mut found = Vec::new();
     let mut start = 0;
     for line in text.split_inclusive('\n') {
@@ -44,10 +49,13 @@ pub(crate) fn annotations(path: &str, text: &str, diagnostics: &mut Vec<Diagnost
         {
             let from = start + line.len() - comment.trim_start().len();
             let range = from..from + comment.trim().len();
-            let declared =
-                Some(code).filter(|code| !code.trim().is_empty()).unwrap_or_else(|| next_code(&text[end..]));
+            let is_behind = !code.trim().is_empty();
+            let (begin, declared) = if is_behind { (start, code) } else { next_code(text, end) };
             match annotation(kind, rest, declared) {
-                Ok(annotation) => found.push(annotation),
+                Ok((annotation, name)) if is_kept(begin + name.start..begin + name.end) => {
+                    found.push(annotation);
+                }
+                Ok(_) => {}
                 Err(fault) => diagnostics.push(warning(path, text, range, kind, fault)),
             }
         }
@@ -66,21 +74,28 @@ fn warning(path: &str, text: &str, range: Range<usize>, kind: &str, fault: Strin
     Diagnostic::warning(fault).at(path, text, range).with_help(help)
 }
 
-/// `@slider(…` at the beginning of a comment: the word, and what follows its bracket.
+/// `@slider` at the beginning of a comment: the word, and what follows it.
 fn keyword(comment: &str) -> Option<(&str, &str)> {
-    let (word, rest) = comment.trim_start().strip_prefix('@')?.split_once('(')?;
+    let text = comment.trim_start().strip_prefix('@')?;
+    let end = text.find(|character: char| !character.is_ascii_alphanumeric()).unwrap_or(text.len());
+    let (word, rest) = text.split_at(end);
     KINDS.contains(&word).then_some((word, rest))
 }
 
-/// The first line that is not empty.
-fn next_code(text: &str) -> &str {
-    text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default()
+/// The first line from byte `at` on that is not empty, and where it begins.
+fn next_code(text: &str, at: usize) -> (usize, &str) {
+    let rest = &text[at..];
+    let begin = at + rest.len() - rest.trim_start().len();
+    (begin, text[begin..].lines().next().unwrap_or_default())
 }
 
-fn annotation(kind: &str, rest: &str, code: &str) -> Result<Annotation, String> {
-    let (inside, label) = rest.split_once(')').ok_or("this annotation is never closed")?;
+/// What the annotation says of `code`, and where in it the name stands.
+fn annotation(kind: &str, rest: &str, code: &str) -> Result<(Annotation, Range<usize>), String> {
+    let values = rest.strip_prefix('(').ok_or("this annotation has no values in brackets")?;
+    let (inside, label) = values.split_once(')').ok_or("this annotation is never closed")?;
     let arguments: Vec<&str> = inside.split(',').map(str::trim).collect();
-    let (name, value) = declaration(code)?;
+    let (range, value) = declaration(code)?;
+    let name = code[range.clone()].to_owned();
     let label = label.trim().to_owned();
     let number = |text: &str| -> Result<f64, String> {
         let number: Option<f64> = text.parse().ok();
@@ -116,11 +131,11 @@ fn annotation(kind: &str, rest: &str, code: &str) -> Result<Annotation, String> 
         }
     };
     let default = if default.is_empty() { value.into_iter().collect() } else { default };
-    Ok(Annotation { name: name.to_owned(), widget, default, label })
+    Ok((Annotation { name, widget, default, label }, range))
 }
 
 /// What a line declares: the word before its `:` in WGSL, before its `;`, `=` or `[` in GLSL; and the number behind its `=`.
-fn declaration(code: &str) -> Result<(&str, Option<f64>), String> {
+fn declaration(code: &str) -> Result<(Range<usize>, Option<f64>), String> {
     let nowhere = || "this annotation stands at no declaration".to_owned();
     let all = token::tokenize(code).map_err(|_| nowhere())?;
     // What stands in brackets, as in `layout(location = 0)`, declares nothing.
@@ -145,7 +160,7 @@ fn declaration(code: &str) -> Result<(&str, Option<f64>), String> {
     let name = end.and_then(|at| tokens.get(at.checked_sub(1)?)).filter(|token| token.kind == Kind::Word);
     let value = tokens.iter().position(|token| token.is('=')).and_then(|at| tokens.get(at + 1));
     let value = value.and_then(|token| code[token.range()].trim_end_matches(['f', 'u', 'i']).parse().ok());
-    Ok((&code[name.ok_or_else(nowhere)?.range()], value))
+    Ok((name.ok_or_else(nowhere)?.range(), value))
 }
 
 /// Gives the parameter `name` its first value, unless its annotation says one; without an annotation it becomes one.

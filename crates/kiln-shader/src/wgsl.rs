@@ -1,6 +1,7 @@
 //! WGSL: link, compile, explain.
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 use kiln_diagnostic::{Diagnostic, has_errors};
 
@@ -50,8 +51,11 @@ pub fn compile(
 }
 
 fn annotations(graph: &Graph, diagnostics: &mut Vec<Diagnostic>) -> Vec<parameter::Annotation> {
-    let of_module =
-        |module: &crate::link::Module| parameter::annotations(&module.path, &module.text, diagnostics);
+    let of_module = |module: &crate::link::Module| {
+        let cuts = &module.view.cuts;
+        let is_kept = |name: Range<usize>| !cuts.iter().any(|cut| cut.contains(&name.start));
+        parameter::annotations(&module.path, &module.text, is_kept, diagnostics)
+    };
     graph.modules.iter().flat_map(of_module).collect()
 }
 

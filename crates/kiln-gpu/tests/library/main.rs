@@ -11,6 +11,7 @@ mod functions;
 mod glsl;
 mod lobes;
 mod passes;
+mod pictures;
 mod reference;
 mod samples;
 mod semantics;

@@ -1,5 +1,7 @@
 //! What GLSL means: programs of `tests/shaders/semantics` through Kiln's front end, and through glslang's, whose SPIR-V goes
-//! to the driver as it is. Both run on one device over the same numbers and must write the same.
+//! to the driver as it is. Both run on one device over the same numbers and textures and must write the same.
+//!
+//! WebGPU has no combined samplers: programs that sample declare theirs under `#ifdef KILN`, and beside it what they mean.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -9,6 +11,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use kiln_gpu::Gpu;
 
+use crate::pictures::{self, Picture};
 use crate::support::{gpu, repository, say};
 
 /// Integers, then floats, of the buffer that every program reads and writes.
@@ -72,23 +75,33 @@ fn programs() -> Vec<Program> {
     paths.iter().map(|path| Program::read(path)).collect()
 }
 
+/// A program as a device takes it.
+struct Made {
+    module: wgpu::ShaderModule,
+    entry_point: &'static str,
+    /// What it samples: bindings of group 1.
+    pictures: Vec<(u32, String)>,
+}
+
 /// What Kiln makes of `text`.
 #[track_caller]
-fn kilns(gpu: &Gpu, name: &str, text: &str) -> (wgpu::ShaderModule, &'static str) {
+fn kilns(gpu: &Gpu, name: &str, text: &str) -> Made {
     let root = format!("{name}.comp");
     let mut read = |path: &str| Some(Arc::from(text)).filter(|_| path == root);
     let outcome = kiln_shader::compile(&kiln_shader::Program::of(&root), &BTreeSet::new(), &mut read);
     let said: Vec<String> = outcome.diagnostics.iter().map(ToString::to_string).collect();
     let compiled = outcome.compiled.unwrap_or_else(|| panic!("{}", said.join("\n")));
+    let bound = compiled.reflection.bindings.into_iter().filter(|bound| bound.group == 1);
+    let pictures = bound.map(|bound| (bound.binding, bound.name)).collect();
     let source = wgpu::ShaderSource::Wgsl(compiled.wgsl.into());
     let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(name), source });
-    (module, "cs_main")
+    Made { module, entry_point: "cs_main", pictures }
 }
 
 /// What glslang makes of `text`.
 #[track_caller]
 #[expect(unsafe_code, reason = "no other compiler may stand between glslang and the driver")]
-fn glslangs(gpu: &Gpu, name: &str, text: &str) -> (wgpu::ShaderModule, &'static str) {
+fn glslangs(gpu: &Gpu, name: &str, text: &str) -> Made {
     // Tests run beside each other.
     static FILES: AtomicUsize = AtomicUsize::new(0);
     let file = format!("{}-{}", std::process::id(), FILES.fetch_add(1, Ordering::Relaxed));
@@ -109,7 +122,8 @@ fn glslangs(gpu: &Gpu, name: &str, text: &str) -> (wgpu::ShaderModule, &'static 
     };
     // SAFETY: the reference compiler made this module, and its program keeps within the buffer that is bound.
     let module = unsafe { gpu.device.create_shader_module_passthrough(descriptor) };
-    (module, "main")
+    let pictures = (0..).zip(pictures::SLOTS.map(str::to_owned)).collect();
+    Made { module, entry_point: "main", pictures }
 }
 
 /// The numbers that programs begin with: small integers of both signs, and floats that binary fractions hold.
@@ -122,7 +136,7 @@ fn seeds() -> Vec<u32> {
 
 /// Runs a module's entry point in one workgroup over the seeds.
 #[track_caller]
-fn run(gpu: &Gpu, (module, entry_point): &(wgpu::ShaderModule, &str)) -> Vec<u32> {
+fn run(gpu: &Gpu, Made { module, entry_point, pictures }: &Made) -> Vec<u32> {
     use wgpu::{BufferUsages, ShaderStages};
     let buffer = gpu.buffer(bytemuck::cast_slice(&seeds()), BufferUsages::STORAGE | BufferUsages::COPY_SRC);
     let (_, error) = gpu.catch_errors(|| {
@@ -136,11 +150,13 @@ fn run(gpu: &Gpu, (module, entry_point): &(wgpu::ShaderModule, &str)) -> Vec<u32
             },
             count: None,
         };
-        let layout = gpu
-            .device
-            .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &[entry] });
+        let sampled: Vec<_> = pictures.iter().map(|(at, name)| pictures::layout(*at, name)).collect();
+        let [layout, sampled_layout] = [&[entry][..], &sampled].map(|entries| {
+            let descriptor = wgpu::BindGroupLayoutDescriptor { label: None, entries };
+            gpu.device.create_bind_group_layout(&descriptor)
+        });
         let pipeline_layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            bind_group_layouts: &[Some(&layout)],
+            bind_group_layouts: &[Some(&layout), Some(&sampled_layout)],
             ..Default::default()
         });
         let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
@@ -152,16 +168,20 @@ fn run(gpu: &Gpu, (module, entry_point): &(wgpu::ShaderModule, &str)) -> Vec<u32
             cache: None,
         });
         let entries = [wgpu::BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() }];
-        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: None,
-            layout: &layout,
-            entries: &entries,
-        });
+        let made: Vec<_> = pictures.iter().map(|(at, name)| (*at, Picture::of(gpu, name))).collect();
+        let sampled = made
+            .iter()
+            .map(|(at, picture)| wgpu::BindGroupEntry { binding: *at, resource: picture.resource() });
+        let sampled: Vec<_> = sampled.collect();
+        let [group, sampled_group] = [(&layout, &entries[..]), (&sampled_layout, &sampled)]
+            .map(|(layout, entries)| wgpu::BindGroupDescriptor { label: None, layout, entries })
+            .map(|descriptor| gpu.device.create_bind_group(&descriptor));
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         {
             let mut commands = encoder.begin_compute_pass(&Default::default());
             commands.set_pipeline(&pipeline);
             commands.set_bind_group(0, &group, &[]);
+            commands.set_bind_group(1, &sampled_group, &[]);
             commands.dispatch_workgroups(1, 1, 1);
         }
         gpu.queue.submit([encoder.finish()]);

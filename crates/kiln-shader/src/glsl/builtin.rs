@@ -117,6 +117,11 @@ pub fn polyfill(name: &str) -> Option<String> {
             .map(|ty| format!("{ty} kiln_modf({ty} x, out {ty} i) {{ i = trunc(x); return x - i; }}\n"))
             .concat(),
         "outerProduct" => outer_products(),
+        // Layers of array textures; a comparison's reference may stand behind.
+        "layer" => "vec3 kiln_layer(vec3 p) { return vec3(p.xy, floor(p.z + 0.5)); }\n\
+                    vec4 kiln_layer(vec4 p) { return vec4(p.xy, floor(p.z + 0.5), p.w); }\n"
+            .to_owned(),
+        "cube_layer" => "vec4 kiln_cube_layer(vec4 p) { return vec4(p.xyz, floor(p.w + 0.5)); }\n".to_owned(),
         "mat2" => {
             let others =
                 ["float", "mat2", "mat2x3", "mat2x4", "mat3x2", "mat3", "mat3x4", "mat4x2", "mat4x3", "mat4"];

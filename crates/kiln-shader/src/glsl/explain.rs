@@ -9,7 +9,7 @@ use super::declare::Item;
 use super::source::{Mapped, Sources};
 use crate::explain::Finding;
 use crate::front::Fault;
-use crate::suggest;
+use crate::{suggest, writable};
 
 /// A diagnostic for what naga found in the text of a stage.
 pub fn of_stage(
@@ -40,6 +40,9 @@ fn unfit(stage: &Parsed, message: &str) -> Option<String> {
     let name = message.strip_prefix("unknown function `")?.strip_suffix('`')?;
     if name == "kiln_equal" {
         return Some("`==` does not take these types, or one is an array inside of a struct".to_owned());
+    }
+    if ["kiln_layer", "kiln_cube_layer"].contains(&name) {
+        return Some("a lookup of an array texture does not take these coordinates".to_owned());
     }
     let name = name.strip_prefix("kiln_").unwrap_or(name);
     let is_own = |item: &Item| matches!(item, Item::Function(function) if function.name.is(name));
@@ -73,6 +76,12 @@ fn help(
         return Some("use `vec4`, or a matrix of 3 or 4 rows".to_owned());
     } else if message.starts_with("textures of integers") {
         return Some("read them with `texelFetch`".to_owned());
+    } else if message.starts_with("a lookup of an array texture") {
+        return Some("their last component is the layer, as in `vec3(uv, layer)`".to_owned());
+    } else if message.starts_with("`%` does not take") {
+        return Some("give both sides the same type, as in `v % ivec2(n)`".to_owned());
+    } else if message.ends_with(writable::ENDING) {
+        return Some("compute it in a function, or from macros".to_owned());
     } else {
         None
     };

@@ -12,6 +12,7 @@
 //! Not here: geometry and tessellation, which WGSL has not.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::ops::Range;
 use std::rc::Rc;
 
 use kiln_diagnostic::Diagnostic;
@@ -99,7 +100,7 @@ pub fn compile(program: &Program, features: &BTreeSet<String>, lints: bool, read
     let stages = load(&mut sources, program, features, &mut named);
     let mut translated = if has_errors(&sources) { None } else { translate(&mut sources, &stages, lints) };
     if let Some((compiled, _)) = &mut translated {
-        let mut annotations = annotations(&mut sources);
+        let mut annotations = annotations(&mut sources, &stages);
         for (variable, value) in initial::values(&stages) {
             parameter::give_first(&mut annotations, &variable.name.text, variable.ty.is("bool"), value);
         }
@@ -119,12 +120,18 @@ pub fn compile(program: &Program, features: &BTreeSet<String>, lints: bool, read
 }
 
 /// Each file's, though it may be included more than once.
-fn annotations(sources: &mut Sources<'_, '_>) -> Vec<parameter::Annotation> {
+fn annotations(sources: &mut Sources<'_, '_>, stages: &[Parsed]) -> Vec<parameter::Annotation> {
+    let tokens = stages.iter().flat_map(|stage| &stage.tokens);
+    let kept: BTreeSet<(&str, usize)> =
+        tokens.map(|token| (&*sources.files[token.place.file].path, token.place.start)).collect();
     let mut seen = BTreeSet::new();
     let mut found = Vec::new();
     for file in &sources.files {
         if seen.insert(&file.path) {
-            found.extend(parameter::annotations(&file.path, &file.text, &mut sources.diagnostics));
+            found.extend({
+                let is_kept = |name: Range<usize>| kept.contains(&(&*file.path, name.start));
+                parameter::annotations(&file.path, &file.text, is_kept, &mut sources.diagnostics)
+            });
         }
     }
     found

@@ -41,7 +41,7 @@ pub struct Rewriter<'a, 's, 'r> {
     /// What is called by each open parenthesis.
     pub(super) calls: Vec<Option<Rc<str>>>,
     /// Text before a token.
-    before: BTreeMap<usize, Vec<Token>>,
+    pub(super) before: BTreeMap<usize, Vec<Token>>,
     /// Text in place of a token.
     pub(super) instead: BTreeMap<usize, Vec<Token>>,
     result: Option<Rc<str>>,
@@ -360,7 +360,8 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
         }
         let mut name = modern.map_or(&*token.text, |modern| modern).to_owned();
         let count = lex::split_commas(&tokens[at + 2..close]).len();
-        let levelled = builtin::with_level(&name).filter(|(_, wanted)| *wanted == count);
+        let is_shadow = self.is_comparison(tokens, &name, at + 2, close);
+        let levelled = builtin::with_level(&name).filter(|(_, wanted)| *wanted == count && !is_shadow);
         if let Some((with_level, _)) = levelled.filter(|_| self.scene.stage != Stage::Fragment) {
             name = with_level.to_owned();
             self.before.entry(close).or_default().extend(tokens_of(&[",", "0.0"], token.place));
@@ -369,6 +370,7 @@ impl<'a, 's, 'r> Rewriter<'a, 's, 'r> {
             self.scene.polyfills.entry(function).or_insert(token.place);
             name.insert_str(0, "kiln_");
         }
+        self.round_layer(tokens, &name, at + 2, close);
         if let Some(selected) = self.selected(tokens, &name, at + 2, close) {
             name = selected;
         }

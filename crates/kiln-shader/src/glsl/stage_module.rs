@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use naga::front::glsl::{Error, ErrorKind, ExpectedToken, Frontend, Options, TokenValue};
 use naga::valid::{FunctionError, ValidationError};
-use naga::{AddressSpace, Arena, Barrier, Block, Expression, Module, Statement, TypeInner};
+use naga::{AddressSpace, Arena, Barrier, Block, Expression, Module, SampleLevel, Statement, TypeInner};
 
 use super::lower::Lowered;
 use super::source_map::{self, StageFunction};
@@ -13,7 +13,7 @@ use super::{inout, layout, lower, stage, stride};
 use crate::explain::Finding;
 use crate::front::{self, Fault};
 use crate::lint::{self, Warning};
-use crate::{Stage, canonical, describe};
+use crate::{Stage, canonical, describe, writable};
 
 /// What naga made of a stage, or what is wrong.
 pub type Made = Result<Translated, Vec<Finding>>;
@@ -61,6 +61,9 @@ fn run(lowered: &Lowered, stage: Stage, names: &Names, lints: bool) -> Result<Ma
     for (_, function) in module.functions.iter_mut() {
         repair(&mut function.body);
         measure_in_place(&mut function.expressions);
+        if stage != Stage::Fragment {
+            read_first_level(&mut function.expressions);
+        }
     }
     inout::copy_parts(&mut module);
     if let Err(error) = front::validate(&module) {
@@ -78,6 +81,9 @@ fn run(lowered: &Lowered, stage: Stage, names: &Names, lints: bool) -> Result<Ma
         return Ok(Err(vec![finding]));
     }
     let info = front::strip(&mut module)?;
+    if let Err(finding) = writable::check(&module) {
+        return Ok(Err(vec![finding]));
+    }
     let warnings = if lints { lint::check(&module, &info) } else { Vec::new() };
     let wgsl = canonical::emit(&module, &info).map_err(Fault::Internal)?;
     let functions = source_map::functions(&module, &wgsl);
@@ -147,6 +153,18 @@ fn measure_in_place(expressions: &mut Arena<Expression>) {
     for array in measured.collect::<Vec<_>>() {
         if let Expression::Load { pointer } = expressions[array] {
             expressions[array] = expressions[pointer].clone();
+        }
+    }
+}
+
+/// Lookups without derivatives, which have no level by themselves, read the first. Some of GLSL's have no form with a level,
+/// as that of `sampler2DArrayShadow`.
+fn read_first_level(expressions: &mut Arena<Expression>) {
+    for (_, expression) in expressions.iter_mut() {
+        if let Expression::ImageSample { level, .. } = expression
+            && *level == SampleLevel::Auto
+        {
+            *level = SampleLevel::Zero;
         }
     }
 }

@@ -158,6 +158,64 @@ impl Rewriter<'_, '_, '_> {
         texture_array::value(tokens, &self.scene.constants).filter(|_| !hidden)
     }
 
+    /// The combined texture that an argument names, or makes, if it begins with `word`.
+    pub(super) fn combined(&self, word: &str) -> Option<Combined> {
+        match self.local(word) {
+            Some(Local::Texture(combined, _) | Local::Textures(combined, _)) => Some(combined.clone()),
+            Some(Local::Value(_)) => None,
+            None => match self.scene.meanings.get(word) {
+                Some(Meaning::Texture(combined, _) | Meaning::Textures(combined, _)) => {
+                    Some(combined.clone())
+                }
+                _ => builtin::combined(word),
+            },
+        }
+    }
+
+    /// Whether the lookup `name`, whose arguments stand at `first..close`, compares with a reference: WGSL has that at the first
+    /// level or at one of its own choice.
+    pub(super) fn is_comparison(&mut self, tokens: &[Token], name: &str, first: usize, close: usize) -> bool {
+        let combined = tokens.get(first).and_then(|word| self.combined(&word.text));
+        if combined.is_none_or(|combined| combined.sampler != "samplerShadow") {
+            return false;
+        }
+        let arguments = lex::split_commas(&tokens[first..close]);
+        let is_first = |level: &[Token]| matches!(level, [number] if number.text.trim_end_matches(['f', 'F']).parse() == Ok(0.0_f32));
+        let chooses = match texture_array::lookup(name) {
+            Some("textureLod") => arguments.get(2).is_some_and(|level| !is_first(level)),
+            lookup => lookup == Some("textureGrad"),
+        };
+        if chooses {
+            let message = format!("`{name}` of a shadow sampler reads level 0");
+            let help = "shadow maps with levels cannot be compared at a chosen one: write `0.0`, or `texture` in a fragment stage";
+            let warning = self.sources.warning(tokens[first].place, message).with_help(help);
+            self.sources.diagnostics.push(warning);
+        }
+        true
+    }
+
+    /// Rounds the layer among the coordinates of the lookup `name`, whose arguments stand at `first..close`: naga cuts its
+    /// fraction off.
+    pub(super) fn round_layer(&mut self, tokens: &[Token], name: &str, first: usize, close: usize) {
+        if !["texture", "textureLod", "textureGrad"].map(Some).contains(&texture_array::lookup(name)) {
+            return;
+        }
+        let combined = self.combined(&tokens[first].text);
+        let function = match combined.as_ref().and_then(|combined| combined.texture.split_once("texture")) {
+            Some((_, "2DArray")) => "layer",
+            Some((_, "CubeArray")) => "cube_layer",
+            _ => return,
+        };
+        let arguments = lex::split_commas(&tokens[first..close]);
+        let [texture, coordinates, ..] = arguments[..] else { return };
+        let place = tokens[first].place;
+        let start = first + texture.len() + 1;
+        self.scene.polyfills.entry(function).or_insert(place);
+        let written = format!("kiln_{function}");
+        self.before.entry(start).or_default().extend(tokens_of(&[&written, "("], place));
+        self.close(start + coordinates.len(), &[")"], place);
+    }
+
     /// The function to call instead of `name`, if the texture at `at` is an element whose index is not constant: it
     /// takes all elements and the index. `close` is the end of the call.
     pub(super) fn selected(

@@ -178,6 +178,11 @@ impl Lookup<'_> {
     }
 }
 
+/// The lookup that `name` is, without `Offset` and `Proj`.
+pub fn lookup(name: &str) -> Option<&str> {
+    Lookup::of(name).map(|lookup| lookup.name)
+}
+
 /// Which argument of the lookup `name` is its offset, if one is, counted from the texture's 0.
 pub fn offset_argument(name: &str) -> Option<usize> {
     let lookup = Lookup::of(name).filter(|lookup| lookup.has_offset)?;

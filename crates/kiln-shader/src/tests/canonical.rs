@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use super::cases::cases;
+use super::shaders::shipped;
 use super::{Files, compiled};
 use crate::{BindingKind, Compiled, Program, Stage};
 
@@ -51,6 +53,48 @@ fn a_changed_constant_changes_it() {
 fn compiling_canonical_text_again_keeps_the_interface() {
     let first = compile_one(PLAIN);
     assert_eq!(first.reflection, compile_one(&first.wgsl).reflection);
+}
+
+/// naga's writer puts constants where their names stood: its parser then computes, and refuses some of it.
+#[test]
+fn let_that_names_a_constant_stays() {
+    let shader = |statements: &str| {
+        format!(
+            "const LEVEL: f32 = 0.76; @group(0) @binding(0) var<storage, read_write> out: array<f32>;
+            @compute @workgroup_size(1) fn main() {{ {statements} out[0] = x; }}"
+        )
+    };
+    for statements in [
+        "let s = 0.8 - 0.04; let x = 1.0 - s;",
+        "let s = LEVEL; let x = 1.0 - s * s;",
+        "let zero = 0.0; let x = 1.0 / zero;",
+        "let zero = vec2i(); let x = f32((vec2i(4) / zero).x);",
+        "let n = 4u; let x = f32(out[n]) + f32(2u << n);",
+        "var x = 1.0; for (var i = 0; i < 3; i++) { let s = 2.0; x *= 1.0 - s; let t = 3.0; x += t; }",
+        "let s = -2147483647 - 1; let x = f32(s + 1);",
+    ] {
+        let first = compile_one(&shader(statements)).wgsl;
+        assert_eq!(first, compile_one(&first).wgsl, "{statements}");
+    }
+    let with = |value: &str| compile_one(&shader(&format!("let s = {value}; let x = 1.0 - s;"))).wgsl;
+    assert_ne!(with("0.5"), with("0.25"));
+}
+
+#[test]
+fn every_program_of_the_tests_compiles_again_to_the_same_text() {
+    let cases = cases().into_iter().map(|(name, case)| (name, case.compile()));
+    let all = shipped().0.into_keys().map(|path| {
+        let outcome = shipped().compile(&path, &[]);
+        (path, outcome)
+    });
+    let texts: Vec<(String, String)> =
+        cases.chain(all).filter_map(|(name, outcome)| Some((name, outcome.compiled?.wgsl))).collect();
+    assert!(texts.len() > 40, "{} texts", texts.len());
+    for (name, text) in texts {
+        let again = compile_one(&text).wgsl;
+        let differs = text.lines().zip(again.lines()).find(|(first, again)| first != again);
+        assert!(differs.is_none() && text == again, "{name}: {differs:?}");
+    }
 }
 
 /// Names that naga would change: they end in digits or `_`, or locals of functions written earlier have them.

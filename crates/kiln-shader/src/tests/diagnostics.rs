@@ -418,6 +418,45 @@ fn what_only_follows_from_a_broken_declaration_is_not_reported() {
 }
 
 #[test]
+fn assertion_hides_no_fault_of_another_module() {
+    let root = "import b::LIMIT;\nfn own() -> f32 { return 1u; }\n@fragment fn fs_main() -> @location(0) vec4f { return vec4f(LIMIT); }";
+    let places = |b: &str| -> Vec<String> {
+        let outcome = Files::new(&[("a.wgsl", root), ("b.wgsl", b)]).compile("a.wgsl", &[]);
+        outcome.diagnostics.into_iter().map(|found| found.file.unwrap()).collect()
+    };
+    assert_eq!(places("const LIMIT = oops;\nconst_assert LIMIT > 2.0;"), ["a.wgsl", "b.wgsl"]);
+    assert_eq!(places("const LIMIT = 1.0;\nconst_assert LIMIT > 2.0;"), ["a.wgsl", "b.wgsl"]);
+    assert_eq!(places("const LIMIT = 3.0;\nconst_assert LIMIT > 2.0;"), ["a.wgsl"]);
+}
+
+#[test]
+fn module_that_ends_within_a_declaration_is_named_and_not_the_one_behind_it() {
+    let root = "import b::LIMIT;\nfn own() -> f32 { return LIMIT; }\n@fragment fn fs_main() -> @location(0) vec4f { return vec4f(own()); }";
+    let said = |end: &str| {
+        let b = format!("const LIMIT: f32 = 1.0; // first\n{end}");
+        let outcome = Files::new(&[("a.wgsl", root), ("b.wgsl", &b)]).compile("a.wgsl", &[]);
+        let said = outcome.diagnostics.into_iter().map(|found| {
+            let span = found.span.unwrap();
+            format!("{} {}:{} {}", found.file.unwrap(), span.line, span.column, found.message)
+        });
+        said.collect::<Vec<String>>().join("\n")
+    };
+    for (end, column) in [
+        ("const A = 1.0", 11),
+        ("fn f() -> f32", 11),
+        ("@fragment", 2),
+        ("@group(0) @binding(1) var<uniform> x: vec4f // last", 39),
+        ("struct", 1),
+        ("const_assert", 1),
+    ] {
+        assert_eq!(said(end), format!("b.wgsl 2:{column} this module ends within a declaration"), "{end}");
+    }
+    for end in ["", "const A = 1.0;", "fn f() { }", "struct S { x: f32 };", "const_assert true;"] {
+        assert_eq!(said(end), "", "{end}");
+    }
+}
+
+#[test]
 fn types_that_do_not_go_together_are_named_as_their_author_writes_them() {
     let message = |statement: &str| {
         let text = format!(
@@ -439,4 +478,40 @@ fn types_that_do_not_go_together_are_named_as_their_author_writes_them() {
     ];
     let actual = expected.map(|(statement, _)| (statement, message(statement)));
     assert_eq!(actual, expected.map(|(statement, expected)| (statement, expected.to_owned())));
+}
+
+#[test]
+fn what_depends_on_overrides_outside_of_functions_is_refused_by_name_and_place() {
+    let said = |declarations: &str, attribute: &str, statement: &str| {
+        let text = format!(
+            "override n: u32 = 8u;\n{declarations}\n{attribute} fn main() {{ {statement} }}\n@group(0) @binding(0) var<storage, read_write> out: array<u32>;"
+        );
+        let outcome = Files::new(&[("a.wgsl", &text)]).compile("a.wgsl", &[]);
+        let found = outcome.diagnostics.first().map(|found| {
+            let span = found.span.as_ref().unwrap();
+            assert!(found.help.is_some());
+            format!("{}:{} {}", span.line, span.column, found.message)
+        });
+        found.unwrap_or_default()
+    };
+    let plain = "@compute @workgroup_size(1)";
+    let ending = "an override, which only functions may do";
+    for (declarations, attribute, statement, expected) in [
+        ("override b: u32 = 4u / n;", plain, "out[0] = b;", "2:19 the default value of `b` computes with"),
+        (
+            "var<private> p: u32 = n * 2u;",
+            plain,
+            "out[0] = p;",
+            "2:23 the initial value of `p` computes with",
+        ),
+        ("var<workgroup> w: array<u32, n>;", plain, "out[0] = w[1];", "2:1 the length of `w` depends on"),
+        ("var<workgroup> w: array<u32, n * 2>;", plain, "out[0] = w[1];", "2:1 the length of `w` depends on"),
+        ("", "@compute @workgroup_size(4, n)", "", "3:29 the workgroup size of `main` depends on"),
+    ] {
+        let found = said(declarations, attribute, statement);
+        assert_eq!(found, format!("{expected} {ending}"), "{declarations}");
+    }
+    // The twins: what is plain, and what nobody uses.
+    assert_eq!(said("override b: u32 = n; var<private> p: u32 = n;", plain, "out[0] = 4u / b + p;"), "");
+    assert_eq!(said("override b: u32 = 4u / n;", plain, ""), "");
 }

@@ -58,6 +58,8 @@ fn wrong_annotations_are_warned_of_at_their_place() {
         ("// @slider(0, x)", "`x` is no number"),
         ("// @slider(0, 1, 2)", "the default lies outside the slider"),
         ("// @slider(0, 1", "this annotation is never closed"),
+        ("// @color", "this annotation has no values in brackets"),
+        ("// @toggle is lit", "this annotation has no values in brackets"),
         ("// @color(1, 2)", "a color has three components"),
         ("// @toggle(maybe)", "a toggle is true or false"),
         ("// @choice(2, a, b)", "the default of a choice is the number of one of its names"),
@@ -88,6 +90,33 @@ void main() { color = vec4(wet, dry, 0.0, 1.0); }";
     let two = text.replace("float dry = 0.5", "float dry, damp");
     let outcome = Files::new(&[("a.frag", &two)]).compile("a.frag", &[]);
     assert!(rendered(&outcome).contains("stands at two declarations"), "{}", rendered(&outcome));
+}
+
+#[test]
+fn annotations_of_what_conditions_cut_give_no_first_value() {
+    let wgsl = "struct Params {
+        @if(a) wetness: f32, // @slider(0, 1, 0.25)
+        // @slider(0, 1, 0.75)
+        @else wetness: f32,
+        x: vec4f,
+    }
+    @group(3) @binding(0) var<uniform> params: Params;
+    @fragment fn fs_main() -> @location(0) vec4f { return params.x * params.wetness; }";
+    let glsl = "#version 450
+#ifdef FEATURE_A
+uniform float wetness; // @slider(0, 1, 0.25)
+#else
+uniform float wetness; // @slider(0, 1, 0.75)
+#endif
+layout(location = 0) out vec4 color;
+void main() { color = vec4(wetness); }";
+    for (file, text, feature) in [("a.wgsl", wgsl, "a"), ("a.frag", glsl, "a")] {
+        let first = |features: &[&str]| {
+            let outcome = Files::new(&[(file, text)]).compile(file, features);
+            compiled(outcome).reflection.parameters[0].default[0]
+        };
+        assert_eq!((first(&[feature]), first(&[])), (0.25, 0.75), "{file}");
+    }
 }
 
 #[test]
