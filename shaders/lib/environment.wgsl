@@ -29,7 +29,7 @@ fn specular_radiance(direction: vec3f, perceptual_roughness: f32) -> vec3f {
 
 // Radiance convolved with the Charlie lobe of a perceptual roughness. Its chain has the scale of the other.
 fn sheen_radiance(direction: vec3f, perceptual_roughness: f32) -> vec3f {
-    let level = perceptual_roughness * f32(textureNumLevels(env_sheen) - 1u);
+    let level = perceptual_roughness * frame.specular_level_max;
     let texel = textureSampleLevel(env_sheen, env_sampler, environment_direction(direction), level);
     return texel.rgb * (frame.specular_scale * frame.environment_intensity);
 }

@@ -23,10 +23,11 @@ fn sheen(in: Varying) -> Sheen {
     return Sheen(saturate(color), saturate(material.sheen_roughness_factor * texel.a));
 }
 
-// The sheen's light, and what it leaves of the layers below: the albedo scaling of KHR_materials_sheen. The chain is looked
-// up in the mirror direction, as the Khronos sample viewer does.
+// The sheen's light, and what it leaves of the layers below: the albedo scaling of KHR_materials_sheen. Charlie's lobe is
+// as wide as the hemisphere, which lies around the normal: looked up in the mirror direction, as the Khronos sample viewer
+// does, it would show the sun's horizon as a ring on the cloth.
 fn under_sheen(below: vec3f, sheen: Sheen, normal: vec3f, view: vec3f, occlusion: f32) -> vec3f {
     let albedo = sheen_albedo(saturate(dot(normal, view)), sheen.perceptual_roughness);
-    let incoming = sheen_radiance(reflect(-view, normal), sheen.perceptual_roughness);
+    let incoming = sheen_radiance(normal, sheen.perceptual_roughness);
     return sheen.color * albedo * incoming * occlusion + below * (1.0 - max_component(sheen.color) * albedo);
 }

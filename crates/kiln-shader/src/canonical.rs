@@ -15,7 +15,7 @@ use naga::back::wgsl::WriterFlags;
 use naga::compact::{KeepUnused, compact};
 use naga::proc::{Alignment, Layouter};
 use naga::valid::ModuleInfo;
-use naga::{Block, Expression, Module, Range, Span, Statement, StructMember, TypeInner, UniqueArena};
+use naga::{Block, Expression, Handle, Module, Range, Span, Statement, StructMember, TypeInner, UniqueArena};
 use rustc_hash::FxHashSet;
 
 use crate::token::{self, Kind, Token};
@@ -35,7 +35,7 @@ pub fn strip_unused(module: &mut Module) {
     }
 }
 
-fn unused_constants(module: &Module) -> Vec<naga::Handle<naga::Constant>> {
+fn unused_constants(module: &Module) -> Vec<Handle<naga::Constant>> {
     let functions = module.functions.iter().map(|(_, function)| function);
     let functions = functions.chain(module.entry_points.iter().map(|entry| &entry.function));
     let expressions =
@@ -55,7 +55,7 @@ pub fn emit(module: &Module, info: &ModuleInfo) -> Result<String, String> {
     let mut module = module.clone();
     let kept = replace_names(&mut module)?;
     number_locals(&mut module);
-    write_named_constants(&mut module);
+    write_named_constants(&mut module, info);
     let text = naga::back::wgsl::write_string(&module, info, WriterFlags::empty())
         .map_err(|error| format!("cannot write canonical WGSL: {error}"))?;
     // Functions that the writer adds have names that it changes when it meets them again.
@@ -204,16 +204,20 @@ fn number_locals(module: &mut Module) {
     }
 }
 
-/// Has the writer write a `let` for each constant that one names, at the function's beginning. No valid module says so: what
-/// needs no work is never emitted.
-fn write_named_constants(module: &mut Module) {
-    let functions = module.functions.iter_mut().map(|(_, function)| function);
-    for function in functions.chain(module.entry_points.iter_mut().map(|entry| &mut entry.function)) {
+/// Has the writer write a `let` for each constant that one names and something reads, at the function's beginning. No valid
+/// module says so: what needs no work is never emitted.
+fn write_named_constants(module: &mut Module, info: &ModuleInfo) {
+    let functions = module.functions.iter_mut().map(|(handle, function)| (function, &info[handle]));
+    let entries = module.entry_points.iter_mut().enumerate();
+    let entries = entries.map(|(index, entry)| (&mut entry.function, info.get_entry_point(index)));
+    for (function, facts) in functions.chain(entries) {
         let is_constant = |expression: &Expression| {
             matches!(expression, Expression::Literal(_) | Expression::Constant(_) | Expression::ZeroValue(_))
         };
         let named = function.named_expressions.keys().copied();
-        let mut named: Vec<_> = named.filter(|named| is_constant(&function.expressions[*named])).collect();
+        let is_read = |named: &Handle<Expression>| facts[*named].ref_count > 0;
+        let mut named: Vec<_> =
+            named.filter(|named| is_constant(&function.expressions[*named]) && is_read(named)).collect();
         named.sort();
         let mut lets = Block::with_capacity(named.len());
         for constant in named {

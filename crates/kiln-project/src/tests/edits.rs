@@ -161,7 +161,10 @@ fn two_environments_of_one_panorama_share_the_work() {
     let place = Place::new();
     place.build();
     let toml = fs::read_to_string(place.folder.path().join("kiln.toml")).unwrap();
-    place.write("kiln.toml", toml + "[env.hall]\nsource = \"./room.hdr\"\nsize = 8\nirradiance_size = 4\nbake = \"all\"\n");
+    place.write(
+        "kiln.toml",
+        toml + "[env.hall]\nsource = \"./room.hdr\"\nsize = 8\nirradiance_size = 4\nbake = \"all\"\n",
+    );
     let built = place.build();
     assert!(ran(&built).is_empty(), "{:?}", ran(&built));
     assert_eq!(built.targets["env/hall/specular"].parts, built.targets["env/room/specular"].parts);

@@ -8,6 +8,7 @@ use kiln_image::{Image, ktx2};
 use crate::*;
 
 mod config;
+mod demand;
 mod edits;
 mod outputs;
 
