@@ -41,9 +41,7 @@ fn every_kind_of_edit_reaches_two_clients() {
     expect_on_both(4);
 
     project.edit("kiln.toml", "env = \"sky\"", "env = \"studio\"");
-    let ran_for_studio = ran(&watch.published());
-    let is_cloth = |action: &String| action.contains("env/studio/sheen");
-    assert!(!ran_for_studio.is_empty() && ran_for_studio.iter().all(is_cloth), "{ran_for_studio:?}");
+    assert!(ran(&watch.published()).is_empty(), "only a fact about the scene has changed");
     assert_eq!(expect_on_both(5).table.targets["scene/balls"].meta["env"], "studio");
 }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use kiln_diagnostic::Diagnostic;
 use kiln_gpu::Gpu;
 use kiln_link::{Revision, Target};
-use kiln_scene::{Material, variant_name};
+use kiln_scene::{Effect, Material, variant_name};
 use kiln_shader::Reflection;
 
 use crate::binding::FrameBinding;
@@ -101,7 +101,9 @@ impl Preparer {
         let scene = scene_name.as_ref().and_then(|name| self.scene(revision, name, &mut report));
         let scene_env = meta.as_ref().and_then(|meta| meta.env.as_deref());
         let env = choose(selection.env.as_deref(), scene_env, &report.envs, "environment", &mut report.notes);
-        let environment = self.environment(revision, env.as_deref(), &mut report);
+        let is_cloth = |material: &Material| material.effects.contains(&Effect::Sheen);
+        let has_cloth = scene.as_ref().is_some_and(|scene| scene.scene.materials.iter().any(is_cloth));
+        let environment = self.environment(revision, env.as_deref(), has_cloth, &mut report);
         let tonemap = self.full_screen_program(revision, Role::Tonemap, &mut report);
         let tonemap = tonemap.or_else(|| self.neutral_tonemap.clone())?;
         let tonemap_pipeline = tonemap.pipeline(&self.gpu.device, Raster::FULL_SCREEN);
@@ -156,6 +158,7 @@ impl Preparer {
         &mut self,
         revision: &Revision,
         env: Option<&str>,
+        has_cloth: bool,
         report: &mut ApplyReport,
     ) -> Environment {
         let mut cube = |map: &str| match env {
@@ -166,6 +169,11 @@ impl Preparer {
         // Only cloth reads it, and what keeps it from being made is said where that happens.
         let sheen = env.map(|env| format!("env/{env}/sheen"));
         let sheen = sheen.filter(|name| revision.table.targets.contains_key(name));
+        if let (Some(env), None, true) = (env, &sheen, has_cloth) {
+            report.notes.push(format!(
+                "sheen is lit by even grey: no scene with sheen names env/{env}; `sheen = true` there bakes its chain"
+            ));
+        }
         let sheen = sheen.map(|name| self.cube(revision, &name, report));
         let sheen = sheen.unwrap_or_else(|| Arc::clone(&self.neutral_cube));
         if sheen.levels > 1 && sheen.scale.to_bits() != specular.scale.to_bits() {

@@ -148,7 +148,8 @@ fn env_demand(project: &Project, name: &str, env: &EnvConfig, scenes: &[SceneDem
             demand.specular[level].push(reason.clone());
         }
     }
-    for scene in scenes.iter().filter(|scene| scene.env == name) {
+    // One that no scene names is there to be chosen in the preview, for any of them.
+    for scene in scenes.iter().filter(|scene| scene.env == name || !is_used) {
         for material in &scene.materials {
             let reason = |values: String| Reason::Material {
                 scene: scene.name.clone(),
