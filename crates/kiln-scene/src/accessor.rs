@@ -164,6 +164,27 @@ impl<'a> Data<'a> {
         Ok(self.accessor(index, user)?.count)
     }
 
+    /// Whether an accessor that exists holds floats.
+    pub fn is_float(&self, index: usize) -> bool {
+        self.component(index) == Some(Component::F32)
+    }
+
+    /// Whether an accessor that exists holds bytes as they are.
+    pub fn is_byte(&self, index: usize) -> bool {
+        self.component(index) == Some(Component::U8) && !self.root.accessors[index].normalized
+    }
+
+    /// Whether an accessor that exists holds integers that stand for [0, 1] or [−1, 1].
+    pub fn is_normalized(&self, index: usize) -> bool {
+        use Component::{I8, I16, U8, U16};
+        let component = self.component(index);
+        self.root.accessors[index].normalized && matches!(component, Some(I8 | U8 | I16 | U16))
+    }
+
+    fn component(&self, index: usize) -> Option<Component> {
+        Component::from_gl(self.root.accessors[index].component_type)
+    }
+
     /// Elements as floats; missing components keep the value of `fill`, so that a `VEC3` colour gets alpha 1.
     pub fn floats<const N: usize>(
         &self,

@@ -30,6 +30,17 @@ pub(crate) struct Needs {
     pub uv: [bool; 2],
 }
 
+impl Needs {
+    /// What either of two materials reads. Tangents can follow one placement only: the first's.
+    pub fn or(self, other: Needs) -> Needs {
+        Needs {
+            normals: self.normals || other.normals,
+            tangents: self.tangents.or(other.tangents),
+            uv: [self.uv[0] || other.uv[0], self.uv[1] || other.uv[1]],
+        }
+    }
+}
+
 /// How the primitive is deformed before it is placed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Deformation<'a> {
@@ -119,7 +130,7 @@ pub(crate) fn read(
 }
 
 fn draco_only<'a>(data: &Data<'_>, primitive: &'a Primitive, position: usize) -> Option<&'a str> {
-    let name = primitive.extensions.keys().find(|name| name.contains("draco"))?;
+    let name = primitive.extensions.others.keys().find(|name| name.contains("draco"))?;
     let accessor = data.root.accessors.get(position)?;
     accessor.buffer_view.is_none().then_some(name.as_str())
 }

@@ -16,3 +16,7 @@ pub const TEXEL_COUNT_MAX: usize = 1 << 28;
 pub const JSON_BYTES_MAX: usize = 1 << 28;
 /// Most notes kept; a file with more repeats itself.
 pub const NOTE_COUNT_MAX: usize = 256;
+/// Most channels of all animations together.
+pub const CHANNEL_COUNT_MAX: usize = 1 << 16;
+/// Most times and values of all curves together (128 MB): channels may name one accessor many times.
+pub const CURVE_VALUE_COUNT_MAX: usize = 1 << 25;

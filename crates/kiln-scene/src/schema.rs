@@ -7,8 +7,11 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+pub(crate) use crate::schema::animation::*;
 pub(crate) use crate::schema::material::*;
 
+#[path = "schema_animation.rs"]
+mod animation;
 #[path = "schema_material.rs"]
 mod material;
 
@@ -30,9 +33,8 @@ pub(crate) struct Root {
     pub meshes: Vec<Mesh>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub skins: Vec<Skin>,
-    /// Only their number matters: the rest pose is drawn.
-    #[serde(default, skip_serializing)]
-    pub animations: Vec<serde::de::IgnoredAny>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub animations: Vec<Animation>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub materials: Vec<Material>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -67,6 +69,8 @@ pub(crate) struct Asset {
 pub(crate) struct RootExtensions {
     #[serde(rename = "KHR_lights_punctual", default, skip_serializing_if = "Option::is_none")]
     pub lights: Option<Lights>,
+    #[serde(rename = "KHR_materials_variants", default, skip_serializing_if = "Option::is_none")]
+    pub variants: Option<Variants>,
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
@@ -134,7 +138,7 @@ pub(crate) struct Node {
 pub(crate) struct NodeExtensions {
     #[serde(rename = "KHR_lights_punctual", default, skip_serializing_if = "Option::is_none")]
     pub light: Option<LightIndex>,
-    #[serde(rename = "KHR_node_visibility", default, skip_serializing)]
+    #[serde(rename = "KHR_node_visibility", default, skip_serializing_if = "Option::is_none")]
     pub visibility: Option<Visibility>,
     #[serde(rename = "EXT_mesh_gpu_instancing", default, skip_serializing)]
     pub instancing: Option<Instancing>,
@@ -174,8 +178,8 @@ pub(crate) struct Primitive {
     pub mode: Option<u32>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub targets: Vec<BTreeMap<String, usize>>,
-    #[serde(default, skip_serializing)]
-    pub extensions: BTreeMap<String, serde::de::IgnoredAny>,
+    #[serde(default, skip_serializing_if = "has_no_variants")]
+    pub extensions: PrimitiveExtensions,
 }
 
 #[derive(Clone, Debug, Deserialize, Serialize)]
@@ -193,7 +197,7 @@ pub(crate) struct Texture {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<usize>,
     #[serde(default, skip_serializing)]
-    pub extensions: BTreeMap<String, serde::de::IgnoredAny>,
+    pub extensions: TextureExtensions,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
@@ -321,6 +325,10 @@ pub(crate) struct Buffer {
 
 pub(crate) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
+}
+
+fn has_no_variants(extensions: &PrimitiveExtensions) -> bool {
+    extensions.variants.is_none()
 }
 
 pub(crate) fn one() -> f32 {

@@ -1,5 +1,6 @@
 //! Tests of the whole way: bytes in, scene and pack out.
 
+mod animation;
 mod build;
 mod corpus;
 mod effects;

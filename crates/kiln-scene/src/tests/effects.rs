@@ -277,7 +277,8 @@ fn refracted_light_is_read_sharper_in_thin_media_and_sheen_by_its_own_roughness(
             "KHR_materials_sheen": {"sheenColorFactor": [1, 1, 1], "sheenRoughnessFactor": 0.8}}})
     };
     let reads = |ior, dispersion| {
-        pack_alone(&File::with_material(glass(ior, dispersion)).texture([0, 0, 0, 255]).bytes()).effects[0].reads
+        pack_alone(&File::with_material(glass(ior, dispersion)).texture([0, 0, 0, 255]).bytes()).effects[0]
+            .reads
     };
     super::check_within("window glass", &reads(1.5, 0.0).ggx.unwrap(), &[0.5, 0.5], 1e-6);
     super::check_within("thin medium", &reads(1.2, 0.0).ggx.unwrap(), &[0.2, 0.5], 1e-6);
