@@ -6,8 +6,10 @@ mod corpus;
 mod effects;
 mod geometry;
 mod hostile;
+mod motion;
 mod packing;
 mod uris;
+mod variants;
 
 use std::sync::Arc;
 
