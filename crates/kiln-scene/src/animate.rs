@@ -34,7 +34,7 @@ pub(crate) fn read(data: &Data<'_>) -> Motion {
             Ok(animation) if animation.channels.is_empty() => {}
             Ok(animation) => motion.animations.push(animation),
             Err(error) => {
-                motion.warnings.push(error.with_help("the animation is left out, the rest pose is drawn"))
+                motion.warnings.push(error.with_help("the animation is left out, the rest pose is drawn"));
             }
         }
     }
@@ -44,9 +44,8 @@ pub(crate) fn read(data: &Data<'_>) -> Motion {
 
 impl Motion {
     fn targets(&self) -> impl Iterator<Item = (Target, &Curve)> {
-        let of = |animation: &'_ Animation| animation.channels.len();
-        self.animations.iter().flat_map(move |it| {
-            (0..of(it)).map(|at| (it.channels[at].target, &it.curves[it.channels[at].curve]))
+        self.animations.iter().flat_map(|animation| {
+            animation.channels.iter().map(|channel| (channel.target, &animation.curves[channel.curve]))
         })
     }
 

@@ -54,7 +54,9 @@ fn extension(name: &str, values: Value) -> Value {
 
 #[test]
 fn animated_factors_count_with_all_they_become_and_constant_ones_do_not() {
-    let cases: &[(&str, &str, &[f32], &[f32], &str, &str)] = &[
+    // Extension, property, values that call for the effect, values that do not, their type, the effect.
+    type Case = (&'static str, &'static str, &'static [f32], &'static [f32], &'static str, &'static str);
+    let cases: &[Case] = &[
         ("clearcoat", "clearcoatFactor", &[0.0, 1.0], &[0.0, 0.0], "SCALAR", "clearcoat"),
         ("sheen", "sheenColorFactor", &[0.0, 0.0, 0.0, 0.0, 0.5, 0.0], &[0.0; 6], "VEC3", "sheen"),
         ("transmission", "transmissionFactor", &[0.0, 1.0], &[0.0, -1.0], "SCALAR", "transmission"),
