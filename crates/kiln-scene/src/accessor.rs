@@ -164,6 +164,32 @@ impl<'a> Data<'a> {
         Ok(self.accessor(index, user)?.count)
     }
 
+    /// Whether there is anything behind the buffer.
+    pub fn has_bytes(&self, buffer: usize) -> bool {
+        self.buffers.get(buffer).is_some_and(|blob| blob.bytes().is_some())
+    }
+
+    /// What keeps an accessor from being read, whether or not something reads it.
+    pub fn check_accessor(&self, index: usize) -> Option<SceneError> {
+        const KINDS: [&str; 7] = ["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"];
+        let accessor = self.root.accessors.get(index)?;
+        let layout = match self.layout(index, accessor, &KINDS, u32::MAX as usize) {
+            Ok(layout) => layout,
+            Err(error) => return Some(error),
+        };
+        self.sparse(index, accessor.sparse.as_ref()?, &layout).err()
+    }
+
+    /// What keeps a buffer view from being read.
+    pub fn check_view(&self, index: usize) -> Option<SceneError> {
+        let buffer = self.buffers.get(self.root.buffer_views.get(index)?.buffer);
+        // One without data is a fault of the buffer, or of whoever reads it.
+        if buffer.is_some_and(|blob| blob.bytes().is_none()) {
+            return None;
+        }
+        self.span("", index, 0).err()
+    }
+
     /// Elements as floats; missing components keep the value of `fill`, so that a `VEC3` colour gets alpha 1.
     pub fn floats<const N: usize>(
         &self,
@@ -362,7 +388,8 @@ fn component_count(kind: &str) -> usize {
     match kind {
         "VEC2" => 2,
         "VEC3" => 3,
-        "VEC4" => 4,
+        "VEC4" | "MAT2" => 4,
+        "MAT3" => 9,
         "MAT4" => 16,
         _ => 1,
     }

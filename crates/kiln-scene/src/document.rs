@@ -3,6 +3,8 @@
 use serde::Deserialize;
 
 use crate::container::{self, Container};
+use crate::json::Json;
+use crate::locate::pointer_at;
 use crate::schema::Root;
 use crate::{SceneError, limits};
 
@@ -10,6 +12,8 @@ use crate::{SceneError, limits};
 #[derive(Debug)]
 pub(crate) struct Document<'a> {
     pub root: Root,
+    /// The same as it stands, for checks on what is not drawn.
+    pub json: Json<'a>,
     pub bin: Option<&'a [u8]>,
 }
 
@@ -33,10 +37,26 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Document<'_>, SceneError> {
         SceneError::new("", format!("the JSON is not UTF-8: byte {}", error.valid_up_to()))
             .with_help("is this a glTF file?")
     })?;
+    check_value_count(json)?;
     check_version(text)?;
     let root = serde_json::from_str(text).map_err(|error| json_error(text, &error))?;
     check_numbers(text)?;
-    Ok(Document { root, bin })
+    let json = serde_json::from_str(text).map_err(|error| json_error(text, &error))?;
+    Ok(Document { root, json, bin })
+}
+
+/// Every `{}` of two bytes becomes a table entry of hundreds, so their number is limited before they are made.
+fn check_value_count(json: &[u8]) -> Result<(), SceneError> {
+    let count = |wanted: &[u8]| json.iter().filter(|byte| wanted.contains(byte)).count();
+    for (what, count, limit) in [
+        ("objects", count(b"{"), limits::JSON_OBJECT_COUNT_MAX),
+        ("values", count(b"{[,"), limits::JSON_VALUE_COUNT_MAX),
+    ] {
+        if count > limit {
+            return Err(SceneError::new("", format!("{count} JSON {what} exceed the limit of {limit}")));
+        }
+    }
+    Ok(())
 }
 
 /// Refuses numbers that `f32` cannot hold: they would be infinite in the scene, and JSON has no infinity for
@@ -116,7 +136,8 @@ fn json_error(text: &str, error: &serde_json::Error) -> SceneError {
     let kind = if error.is_data() { "not as the glTF schema wants it" } else { "invalid JSON" };
     let place = format!("line {} column {}", error.line(), error.column());
     SceneError {
-        pointer: String::new(),
+        // In broken JSON the line and the column are the place.
+        pointer: if error.is_data() { pointer_at(text, at) } else { String::new() },
         reason: format!("{kind}: {reason} ({place})"),
         help: None,
         json_bytes: Some(at..at + 1),

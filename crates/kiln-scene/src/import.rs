@@ -13,7 +13,7 @@ use crate::pose::{Pose, joint_matrices, pose};
 use crate::textures::TextureTable;
 use crate::write::GENERATOR;
 use crate::{Bounds, Draw, Primitive, Scene, SceneError};
-use crate::{extensions, limits, rig, schema, shape};
+use crate::{conform, extensions, limits, rig, schema, shape};
 
 /// A scene, and the parts of the file that a pack needs besides.
 #[derive(Debug, Default)]
@@ -48,6 +48,7 @@ pub(crate) fn import(
     let buffers = fetch_buffers(file, root, document.bin, resolve)?;
     let data = Data { root, buffers };
     let pose = pose(root).map_err(|error| vec![error])?;
+    let faults = conform::check(&document.json, &data);
     let textures = TextureTable::new(file, &data, resolve);
     let importer = Importer {
         data: &data,
@@ -63,7 +64,9 @@ pub(crate) fn import(
         cameras: Vec::new(),
         lights: Vec::new(),
     };
-    importer.run().map_err(|error| vec![error])
+    let mut imported = importer.run().map_err(|error| vec![error])?;
+    imported.warnings.extend(faults);
+    Ok(imported)
 }
 
 /// Notes in the order they came up, each once.

@@ -23,6 +23,7 @@ pub use scene::*;
 pub use uri::{Uri, UriKind, external_uris};
 
 mod accessor;
+mod conform;
 mod container;
 mod document;
 mod effect;
@@ -31,6 +32,7 @@ mod extensions;
 mod geometry;
 mod images;
 mod import;
+mod json;
 pub mod limits;
 mod locate;
 mod material_table;

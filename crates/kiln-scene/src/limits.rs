@@ -14,5 +14,9 @@ pub const IMAGE_EDGE_MAX: u32 = 16_384;
 pub const TEXEL_COUNT_MAX: usize = 1 << 28;
 /// Most bytes of JSON text.
 pub const JSON_BYTES_MAX: usize = 1 << 28;
+/// Most objects in the JSON text; a thousand times the draws of a large scene.
+pub const JSON_OBJECT_COUNT_MAX: usize = 1 << 20;
+/// Most values in the JSON text, which has no vertices in it.
+pub const JSON_VALUE_COUNT_MAX: usize = 1 << 23;
 /// Most notes kept; a file with more repeats itself.
 pub const NOTE_COUNT_MAX: usize = 256;

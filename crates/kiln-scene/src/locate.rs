@@ -23,6 +23,51 @@ pub(crate) fn locate(text: &str, pointer: &str) -> Option<Range<usize>> {
     Some(start..cursor.at)
 }
 
+/// JSON pointer of the innermost value around byte `at`, the inverse of [`locate`]; for text that may be broken
+/// from there on.
+pub(crate) fn pointer_at(text: &str, at: usize) -> String {
+    enum Step {
+        Key(String),
+        Index(usize),
+    }
+    let mut cursor = Cursor { bytes: text.as_bytes().get(..=at).unwrap_or(text.as_bytes()), at: 0 };
+    let (mut path, mut expects_key): (Vec<Step>, bool) = (Vec::new(), false);
+    while let Some(byte) = cursor.peek() {
+        match byte {
+            // The value that ends here may be the culprit.
+            b'}' | b']' if cursor.at == at => break,
+            b'{' => (path.push(Step::Key(String::new())), expects_key = true).0,
+            b'[' => path.push(Step::Index(0)),
+            b'}' | b']' => drop(path.pop()),
+            b',' => match path.last_mut() {
+                Some(Step::Index(index)) => *index += 1,
+                Some(Step::Key(key)) => (key.clear(), expects_key = true).0,
+                None => {}
+            },
+            b'"' => {
+                let start = cursor.at;
+                let is_whole = cursor.skip_string().is_some();
+                if let (Some(Step::Key(key)), true, true) = (path.last_mut(), expects_key, is_whole) {
+                    text.get(start + 1..cursor.at - 1).unwrap_or_default().clone_into(key);
+                    expects_key = false;
+                }
+                continue;
+            }
+            _ => {}
+        }
+        cursor.at += 1;
+    }
+    let mut pointer = String::new();
+    for step in path {
+        match step {
+            Step::Key(key) if key.is_empty() => {}
+            Step::Key(key) => pointer = format!("{pointer}/{}", key.replace('~', "~0").replace('/', "~1")),
+            Step::Index(index) => pointer = format!("{pointer}/{index}"),
+        }
+    }
+    pointer
+}
+
 struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,
