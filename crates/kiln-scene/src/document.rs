@@ -15,6 +15,8 @@ pub(crate) struct Document<'a> {
     /// The same as it stands, for checks on what is not drawn.
     pub json: Json<'a>,
     pub bin: Option<&'a [u8]>,
+    /// Faults of the container.
+    pub faults: Vec<SceneError>,
 }
 
 /// The JSON of a .gltf as text, for messages that show a line; `None` for a GLB or bytes that are not UTF-8.
@@ -28,7 +30,7 @@ pub(crate) fn text_of(bytes: &[u8]) -> Option<&str> {
 /// # Errors
 /// Broken containers, invalid JSON, wrong types, versions other than 2.x.
 pub(crate) fn parse(bytes: &[u8]) -> Result<Document<'_>, SceneError> {
-    let Container { json, bin, .. } = container::open(bytes)?;
+    let Container { json, bin, faults, .. } = container::open(bytes)?;
     if json.len() > limits::JSON_BYTES_MAX {
         let (actual, limit) = (json.len(), limits::JSON_BYTES_MAX);
         return Err(SceneError::new("", format!("{actual} bytes of JSON exceed the limit of {limit}")));
@@ -42,7 +44,7 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Document<'_>, SceneError> {
     let root = serde_json::from_str(text).map_err(|error| json_error(text, &error))?;
     check_numbers(text)?;
     let json = serde_json::from_str(text).map_err(|error| json_error(text, &error))?;
-    Ok(Document { root, json, bin })
+    Ok(Document { root, json, bin, faults })
 }
 
 /// Every `{}` of two bytes becomes a table entry of hundreds, so their number is limited before they are made.

@@ -65,7 +65,7 @@ pub(crate) fn import(
         lights: Vec::new(),
     };
     let mut imported = importer.run().map_err(|error| vec![error])?;
-    imported.warnings.extend(faults);
+    imported.warnings.extend(document.faults.iter().cloned().chain(faults));
     Ok(imported)
 }
 
@@ -256,6 +256,7 @@ impl Importer<'_, '_> {
             }
             Read::Geometry(geometry) => {
                 self.note_missing_uvs(primitive, needs, &pointer);
+                self.note_restart(primitive, &geometry.indices, &pointer);
                 let (geometry, remarks) = shape::finish(geometry, needs);
                 remarks.into_iter().for_each(|remark| self.notes.push(format!("{pointer}: {remark}")));
                 if geometry.indices.is_empty() {
@@ -272,6 +273,19 @@ impl Importer<'_, '_> {
             if needs.uv[set] && !primitive.attributes.contains_key(&name) {
                 self.notes.push(format!("{pointer}: its material's textures want {name}, which it lacks"));
             }
+        }
+    }
+
+    /// The largest value of its type in an index means a new strip to a GPU, which glTF does not have.
+    fn note_restart(&mut self, primitive: &schema::Primitive, indices: &[u32], pointer: &str) {
+        let accessor = primitive.indices.and_then(|index| self.data.root.accessors.get(index));
+        let largest = match accessor.map(|accessor| accessor.component_type) {
+            Some(5121) => u32::from(u8::MAX),
+            Some(5123) => u32::from(u16::MAX),
+            _ => return,
+        };
+        if indices.contains(&largest) {
+            self.notes.push(format!("{pointer}/indices: {largest} is reserved; it was read as a vertex"));
         }
     }
 

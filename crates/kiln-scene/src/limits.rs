@@ -14,7 +14,7 @@ pub const IMAGE_EDGE_MAX: u32 = 16_384;
 pub const TEXEL_COUNT_MAX: usize = 1 << 28;
 /// Most bytes of JSON text.
 pub const JSON_BYTES_MAX: usize = 1 << 28;
-/// Most objects in the JSON text; a thousand times the draws of a large scene.
+/// Most objects in the JSON text; sixteen for each of the most draws.
 pub const JSON_OBJECT_COUNT_MAX: usize = 1 << 20;
 /// Most values in the JSON text, which has no vertices in it.
 pub const JSON_VALUE_COUNT_MAX: usize = 1 << 23;

@@ -1,7 +1,7 @@
 //! Animations: channels, samplers, times and rotations.
 
 use std::cmp::Ordering;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::Findings;
 use super::storage::Claims;
@@ -30,7 +30,7 @@ pub(super) fn check(root: &Json<'_>, data: &Data<'_>, findings: &mut Findings) {
                 check_times(data, index, &format!("{place}/input"), findings);
             }
         }
-        let mut targets = BTreeSet::new();
+        let mut targets = BTreeMap::new();
         for (at, channel) in animation.table("channels").iter().enumerate() {
             let place = format!("{place}/channels/{at}");
             check_channel(root, channel, &place, &mut targets, findings);
@@ -82,7 +82,7 @@ fn check_channel(
     root: &Json<'_>,
     channel: &Json<'_>,
     place: &str,
-    targets: &mut BTreeSet<(usize, String)>,
+    targets: &mut BTreeMap<(usize, String), String>,
     findings: &mut Findings,
 ) {
     let Some(target) = channel.get("target") else { return };
@@ -93,8 +93,8 @@ fn check_channel(
         return;
     }
     let Some(index) = target.index_at("node") else { return };
-    if !targets.insert((index, path.to_owned())) {
-        findings.push(place.clone(), "another channel has the same target");
+    if let Some(first) = targets.insert((index, path.to_owned()), place.clone()) {
+        findings.push(first, format!("{place} is the same target"));
     }
     let Some(node) = root.table("nodes").get(index) else { return };
     match path {

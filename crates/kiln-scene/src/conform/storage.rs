@@ -1,8 +1,9 @@
 //! Buffers, buffer views, accessors and images: what they say about bytes.
 
 use super::{Findings, Used};
-use crate::accessor::Data;
+use crate::accessor::{Data, element_bytes};
 use crate::json::Json;
+use crate::uri;
 
 /// An accessor's claims, as far as they are well-formed.
 #[derive(Clone, Copy, Debug)]
@@ -36,6 +37,18 @@ impl<'a> Claims<'a> {
             5122 | 5123 => 2,
             _ => 4,
         }
+    }
+
+    /// Why the elements do not fit the buffer view, if so; looks at numbers alone, as the bytes may be missing.
+    fn misfit(&self, root: &Json<'_>) -> Option<String> {
+        let length = root.table("bufferViews").get(self.view?)?.index_at("byteLength")?;
+        let size = element_bytes(self.kind, self.component_bytes());
+        let stride = self.stride(root).unwrap_or(size);
+        if stride < size {
+            return Some(format!("byteStride {stride} is less than the {size} bytes of an element"));
+        }
+        let needed = self.count.saturating_sub(1).saturating_mul(stride).saturating_add(size + self.offset);
+        (needed > length).then(|| format!("its elements end at {needed}, the buffer view at {length}"))
     }
 
     /// Bytes from the start of the buffer.
@@ -73,12 +86,16 @@ fn check_buffer(at: usize, buffer: &Json<'_>, data: &Data<'_>, findings: &mut Fi
     if uri.is_none() && buffer.get("extensions").is_none() && !data.has_bytes(at) {
         findings.push(format!("/buffers/{at}"), "it has no URI and the file no binary chunk for it");
     }
+    let place = format!("/buffers/{at}/uri");
+    if uri.is_some_and(|uri| !uri::is_well_formed(uri)) {
+        findings.push(place.clone(), "it is no well-formed URI");
+    }
     let media = uri.and_then(|uri| uri.strip_prefix("data:")).and_then(|uri| uri.split([';', ',']).next());
     if let Some(media) = media
         && !["application/octet-stream", "application/gltf-buffer"].contains(&media)
     {
         let reason = format!("`{media}` is no media type of a buffer; its bytes were taken as they are");
-        findings.push(format!("/buffers/{at}/uri"), reason);
+        findings.push(place, reason);
     }
 }
 
@@ -97,8 +114,11 @@ fn check_view(at: usize, view: &Json<'_>, data: &Data<'_>, findings: &mut Findin
 
 fn check_accessor(root: &Json<'_>, at: usize, data: &Data<'_>, findings: &mut Findings) {
     let place = format!("/accessors/{at}");
-    data.check_accessor(at).into_iter().for_each(|error| findings.add(error));
     let Some(claims) = Claims::of(root, at) else { return };
+    match claims.misfit(root) {
+        Some(reason) => findings.push(place.clone(), reason),
+        None => data.check_accessor(at).into_iter().for_each(|error| findings.add(error)),
+    }
     let size = claims.component_bytes();
     if claims.view.is_some() {
         let unaligned = [("/byteOffset", claims.offset), ("", claims.total_offset(root))];
@@ -127,15 +147,12 @@ fn check_accessor(root: &Json<'_>, at: usize, data: &Data<'_>, findings: &mut Fi
 
 /// The MIME types that images say they have, and whether a texture can show them.
 fn check_images(root: &Json<'_>, used: &Used<'_>, findings: &mut Findings) {
-    let others = used.iter().any(|name| name.contains("texture"));
-    let enabled = |mime: &str| match mime {
-        "image/png" | "image/jpeg" => true,
-        "image/webp" => used.contains("EXT_texture_webp"),
-        "image/ktx2" => used.contains("KHR_texture_basisu"),
-        _ => others,
-    };
+    let enabled = |mime: &str| mime != "image/webp" || used.contains("EXT_texture_webp");
     let images = root.table("images");
     for (at, image) in images.iter().enumerate() {
+        if image.get("uri").and_then(Json::text).is_some_and(|uri| !uri::is_well_formed(uri)) {
+            findings.push(format!("/images/{at}/uri"), "it is no well-formed URI");
+        }
         let declared = image.get("mimeType").and_then(Json::text);
         let media = image.get("uri").and_then(Json::text).and_then(media_type);
         if let Some(mime) = declared.or(media).filter(|mime| !enabled(mime)) {
@@ -148,13 +165,25 @@ fn check_images(root: &Json<'_>, used: &Used<'_>, findings: &mut Findings) {
             findings.push(format!("/images/{at}/uri"), reason);
         }
     }
-    let plain = |index: usize| {
-        let mime = images.get(index).and_then(|image| image.get("mimeType")).and_then(Json::text);
-        mime.is_none_or(|mime| ["image/png", "image/jpeg"].contains(&mime))
+    let mime_of = |index: usize| {
+        let image = images.get(index)?;
+        image
+            .get("uri")
+            .and_then(Json::text)
+            .and_then(media_type)
+            .or(image.get("mimeType").and_then(Json::text))
     };
     for (at, texture) in root.table("textures").iter().enumerate() {
-        if texture.index_at("source").is_some_and(|source| !plain(source)) {
-            findings.push(format!("/textures/{at}/source"), "its image is neither PNG nor JPEG");
+        let webp = texture.get("extensions").and_then(|it| it.get("EXT_texture_webp"));
+        for (slot, texture, allowed) in [
+            ("", Some(texture), &["image/png", "image/jpeg"][..]),
+            ("/extensions/EXT_texture_webp", webp, &["image/webp"][..]),
+        ] {
+            let mime = texture.and_then(|texture| texture.index_at("source")).and_then(mime_of);
+            if let Some(mime) = mime.filter(|mime| !allowed.contains(mime)) {
+                let reason = format!("its image is `{mime}`, but must be {}", allowed.join(" or "));
+                findings.push(format!("/textures/{at}{slot}/source"), reason);
+            }
         }
     }
 }
@@ -162,7 +191,7 @@ fn check_images(root: &Json<'_>, used: &Used<'_>, findings: &mut Findings) {
 /// What a data URI or a file's name says about an image.
 fn media_type(uri: &str) -> Option<&str> {
     if let Some(rest) = uri.strip_prefix("data:") {
-        return rest.split([';', ',']).next().filter(|media| media.starts_with("image/"));
+        return rest.split([';', ',']).next().filter(|media| !media.is_empty());
     }
     match uri.rsplit_once('.')?.1 {
         "png" => Some("image/png"),

@@ -126,6 +126,9 @@ impl Walker<'_, '_> {
                 None => {}
             }
         }
+        if value.get("name").is_some_and(|name| name.text().is_none()) {
+            self.at("name", |it| it.say("it must be a text"));
+        }
         if let Some(extensions) = value.get("extensions") {
             self.at("extensions", |it| it.extensions(extensions, home));
         }
