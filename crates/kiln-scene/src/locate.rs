@@ -1,5 +1,6 @@
 //! Finds the text that a JSON pointer means, so that a message can show the line.
 
+use std::fmt;
 use std::ops::Range;
 
 /// Bytes of the value at `pointer` (RFC 6901, without `~` escapes) in valid JSON `text`; for an object or
@@ -23,33 +24,34 @@ pub(crate) fn locate(text: &str, pointer: &str) -> Option<Range<usize>> {
     Some(start..cursor.at)
 }
 
-/// JSON pointer of the innermost value around byte `at`, the inverse of [`locate`]; for text that may be broken
-/// from there on.
+/// JSON pointer of the innermost value around byte `at`, the inverse of [`locate`]; at a closing bracket the value
+/// that ends there. `text` may be broken from there on.
 pub(crate) fn pointer_at(text: &str, at: usize) -> String {
-    enum Step {
-        Key(String),
-        Index(usize),
-    }
     let mut cursor = Cursor { bytes: text.as_bytes().get(..=at).unwrap_or(text.as_bytes()), at: 0 };
-    let (mut path, mut expects_key): (Vec<Step>, bool) = (Vec::new(), false);
+    let mut path: Vec<Step> = Vec::new();
     while let Some(byte) = cursor.peek() {
         match byte {
-            // The value that ends here may be the culprit.
-            b'}' | b']' if cursor.at == at => break,
-            b'{' => (path.push(Step::Key(String::new())), expects_key = true).0,
-            b'[' => path.push(Step::Index(0)),
-            b'}' | b']' => drop(path.pop()),
+            b'{' => path.push(Step::Member { key: String::new(), is_known: false }),
+            b'[' => path.push(Step::Element(0)),
+            b'}' | b']' => {
+                path.pop();
+                if cursor.at == at {
+                    break;
+                }
+            }
             b',' => match path.last_mut() {
-                Some(Step::Index(index)) => *index += 1,
-                Some(Step::Key(key)) => (key.clear(), expects_key = true).0,
+                Some(Step::Element(index)) => *index += 1,
+                Some(Step::Member { is_known, .. }) => *is_known = false,
                 None => {}
             },
             b'"' => {
-                let start = cursor.at;
+                let start = cursor.at + 1;
                 let is_whole = cursor.skip_string().is_some();
-                if let (Some(Step::Key(key)), true, true) = (path.last_mut(), expects_key, is_whole) {
-                    text.get(start + 1..cursor.at - 1).unwrap_or_default().clone_into(key);
-                    expects_key = false;
+                if let Some(Step::Member { key, is_known: is_known @ false }) = path.last_mut()
+                    && is_whole
+                {
+                    text.get(start..cursor.at - 1).unwrap_or_default().clone_into(key);
+                    *is_known = true;
                 }
                 continue;
             }
@@ -57,15 +59,23 @@ pub(crate) fn pointer_at(text: &str, at: usize) -> String {
         }
         cursor.at += 1;
     }
-    let mut pointer = String::new();
-    for step in path {
-        match step {
-            Step::Key(key) if key.is_empty() => {}
-            Step::Key(key) => pointer = format!("{pointer}/{}", key.replace('~', "~0").replace('/', "~1")),
-            Step::Index(index) => pointer = format!("{pointer}/{index}"),
+    path.iter().map(Step::to_string).collect()
+}
+
+/// A step of a JSON pointer.
+enum Step {
+    Member { key: String, is_known: bool },
+    Element(usize),
+}
+
+impl fmt::Display for Step {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Step::Member { is_known: false, .. } => Ok(()),
+            Step::Member { key, .. } => write!(formatter, "/{}", key.replace('~', "~0").replace('/', "~1")),
+            Step::Element(index) => write!(formatter, "/{index}"),
         }
     }
-    pointer
 }
 
 struct Cursor<'a> {

@@ -1,6 +1,7 @@
 //! Tests of the whole way: bytes in, scene and pack out.
 
 mod build;
+mod conform;
 mod corpus;
 mod effects;
 mod geometry;

@@ -46,7 +46,8 @@ fn zero_normal_is_replaced_by_its_triangles() {
     assert_eq!(normals[0], [0.0, 0.0, 1.0]);
     check_within("made unit", &normals[1], &[0.0, 0.6, 0.8], 1e-6);
     assert_eq!(normals[2], [0.0, 0.0, 1.0]);
-    assert!(scene.notes[0].contains("2 vertices without a usable normal"), "{:?}", scene.notes);
+    assert!(scene.notes[0].contains("1 normals did not have length 1"), "{:?}", scene.notes);
+    assert!(scene.notes[1].contains("2 vertices without a usable normal"), "{:?}", scene.notes);
 }
 
 #[test]
