@@ -69,26 +69,31 @@ pub(crate) fn open(bytes: &[u8]) -> Result<Container<'_>, SceneError> {
 }
 
 /// Joins JSON and payload into a GLB, both padded to four bytes as the format demands.
-pub(crate) fn join(json: &[u8], bin: &[u8]) -> Vec<u8> {
-    let padded = |length: usize| length.next_multiple_of(4);
-    let bin_bytes = if bin.is_empty() { 0 } else { CHUNK_HEADER_BYTES + padded(bin.len()) };
-    let total = HEADER_BYTES + CHUNK_HEADER_BYTES + padded(json.len()) + bin_bytes;
-    let mut out = Vec::with_capacity(total);
-    out.extend_from_slice(MAGIC);
-    out.extend_from_slice(&2u32.to_le_bytes());
-    out.extend_from_slice(&length_field(total).to_le_bytes());
-    push_chunk(&mut out, CHUNK_JSON, json, b' ');
+///
+/// The front goes into the payload's own buffer, as a second one would hold a large file twice.
+pub(crate) fn join(mut json: Vec<u8>, mut bin: Vec<u8>) -> Vec<u8> {
+    json.resize(json.len().next_multiple_of(4), b' ');
+    bin.resize(bin.len().next_multiple_of(4), 0);
+    let bin_bytes = if bin.is_empty() { 0 } else { CHUNK_HEADER_BYTES + bin.len() };
+    let total = HEADER_BYTES + CHUNK_HEADER_BYTES + json.len() + bin_bytes;
+    let mut front = Vec::with_capacity(total - bin.len());
+    front.extend_from_slice(MAGIC);
+    front.extend_from_slice(&2u32.to_le_bytes());
+    front.extend_from_slice(&length_field(total).to_le_bytes());
+    front.extend_from_slice(&chunk_header(CHUNK_JSON, json.len()));
+    front.extend_from_slice(&json);
     if !bin.is_empty() {
-        push_chunk(&mut out, CHUNK_BIN, bin, 0);
+        front.extend_from_slice(&chunk_header(CHUNK_BIN, bin.len()));
     }
-    out
+    bin.splice(0..0, front);
+    bin
 }
 
-fn push_chunk(out: &mut Vec<u8>, kind: &[u8; 4], data: &[u8], pad: u8) {
-    out.extend_from_slice(&length_field(data.len().next_multiple_of(4)).to_le_bytes());
-    out.extend_from_slice(kind);
-    out.extend_from_slice(data);
-    out.resize(out.len().next_multiple_of(4), pad);
+fn chunk_header(kind: &[u8; 4], length: usize) -> [u8; CHUNK_HEADER_BYTES] {
+    let mut header = [0; CHUNK_HEADER_BYTES];
+    header[..4].copy_from_slice(&length_field(length).to_le_bytes());
+    header[4..].copy_from_slice(kind);
+    header
 }
 
 /// The limits on vertices, indices and images keep a pack below the 4 GiB that the format can say.

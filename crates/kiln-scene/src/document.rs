@@ -49,10 +49,14 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Document<'_>, SceneError> {
 
 /// Every `{}` of two bytes becomes a table entry of hundreds, so their number is limited before they are made.
 fn check_value_count(json: &[u8]) -> Result<(), SceneError> {
-    let count = |wanted: &[u8]| json.iter().filter(|byte| wanted.contains(byte)).count();
+    let (mut objects, mut values) = (0, 0);
+    for byte in json {
+        objects += usize::from(*byte == b'{');
+        values += usize::from(matches!(byte, b'{' | b'[' | b','));
+    }
     for (what, count, limit) in [
-        ("objects", count(b"{"), limits::JSON_OBJECT_COUNT_MAX),
-        ("values", count(b"{[,"), limits::JSON_VALUE_COUNT_MAX),
+        ("objects", objects, limits::JSON_OBJECT_COUNT_MAX),
+        ("values", values, limits::JSON_VALUE_COUNT_MAX),
     ] {
         if count > limit {
             return Err(SceneError::new("", format!("{count} JSON {what} exceed the limit of {limit}")));
