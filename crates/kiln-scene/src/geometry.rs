@@ -20,6 +20,9 @@ pub(crate) const NEUTRAL: Vertex = Vertex {
     color: [1.0; 4],
 };
 
+/// Several times what rounding four weights leaves; the sum is scaled to 1 in any case.
+const WEIGHT_SUM_TOLERANCE: f64 = 1e-5;
+
 /// What the material reads; the rest is neither read nor stored.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Needs {
@@ -193,7 +196,7 @@ impl Reader<'_, '_> {
             self.column("TEXCOORD_1", &["VEC2"], &mut vertices, |it, [u, v, ..]| it.uv1 = [u, v])?;
         }
         self.column("COLOR_0", &["VEC3", "VEC4"], &mut vertices, |it, value| it.color = value)?;
-        Ok(Geometry { vertices, indices, has_normals, has_tangents })
+        Ok(Geometry { vertices, indices, has_normals, has_tangents, odd_weight_count: 0 })
     }
 
     /// Reads an attribute straight into the vertices, which takes no memory besides; an absent one is skipped.
@@ -236,6 +239,9 @@ impl Reader<'_, '_> {
         let influences = self.influences(joints.len(), budget)?;
         for (vertex, influence) in geometry.vertices.iter_mut().zip(&influences) {
             let total: f64 = influence.iter().map(|&(_, weight)| weight).sum();
+            let is_odd =
+                (total - 1.0).abs() > WEIGHT_SUM_TOLERANCE || influence.iter().any(|(_, it)| *it < 0.0);
+            geometry.odd_weight_count += usize::from(is_odd);
             // A vertex that no joint holds stays where it was modelled.
             if !(total > 0.0 && total.is_finite()) {
                 continue;

@@ -16,6 +16,8 @@ pub(crate) struct Geometry {
     pub indices: Vec<u32>,
     pub has_normals: bool,
     pub has_tangents: bool,
+    /// Vertices whose joint weights are negative or do not sum up to 1.
+    pub odd_weight_count: usize,
 }
 
 /// How far from 1 the squared length of a unit vector may be; four times what rounding to f32 leaves.
@@ -32,6 +34,7 @@ pub(crate) fn finish(mut geometry: Geometry, needs: Needs) -> (Geometry, Vec<Str
             remarks.push(format!("{count} {what}"));
         }
     };
+    remark(geometry.odd_weight_count, "vertices have joint weights that are negative or whose sum is not 1");
     remark(drop_non_finite_triangles(&mut geometry), "triangles with non-finite positions were dropped");
     let (broken, outside) = repair_attributes(&mut geometry);
     remark(broken, "vertices had non-finite texture coordinates or colours");

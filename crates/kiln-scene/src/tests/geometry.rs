@@ -139,6 +139,24 @@ fn skinned_vertices_follow_their_joints_and_not_their_node() {
 }
 
 #[test]
+fn joint_weights_that_do_not_sum_up_to_one_are_noted() {
+    let notes = |weight: f32| {
+        let mut file = File::triangle();
+        let joints = file.accessor(&[0; 12], 5121, 3, "VEC4");
+        let weights = file.floats(&[[1.0, 0.0, 0.0, 0.0], [weight, 0.5, 0.0, 0.0], [weight, 0.5, 0.0, 0.0]]);
+        let primitive = file.primitive();
+        primitive["attributes"]["JOINTS_0"] = json!(joints);
+        primitive["attributes"]["WEIGHTS_0"] = json!(weights);
+        file.root["skins"] = json!([{"joints": [0]}]);
+        file.root["nodes"][0]["skin"] = json!(0);
+        scene_of(&file.bytes()).notes
+    };
+    assert_eq!(notes(0.5), [""; 0]);
+    assert!(notes(0.25)[0].contains("2 vertices have joint weights"), "{:?}", notes(0.25));
+    assert!(notes(-0.5)[0].contains("2 vertices have joint weights"), "{:?}", notes(-0.5));
+}
+
+#[test]
 fn default_morph_weights_move_vertices_and_a_node_overrides_its_mesh() {
     let mut file = File::triangle();
     let deltas = file.floats(&[[0.0, 0.0, 0.0], [0.0, 0.0, 8.0], [0.0, 0.0, 0.0]]);
