@@ -263,7 +263,7 @@ impl Importer<'_, '_> {
                 self.note_missing_uvs(primitive, needs, &pointer);
                 self.note_restart(primitive, &geometry.indices, &pointer);
                 let (geometry, remarks) = shape::finish(geometry, needs);
-                remarks.into_iter().for_each(|remark| self.notes.push(format!("{pointer}: {remark}")));
+                remarks.into_iter().for_each(|remark| self.notes.push(format!("{pointer}{remark}")));
                 if geometry.indices.is_empty() {
                     return Ok(None);
                 }

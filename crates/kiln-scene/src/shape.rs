@@ -26,19 +26,28 @@ const UNIT_TOLERANCE: f64 = 1e-6;
 /// Squared lengths this far from 1 are worth a word; rounding to 8 bits leaves a third of it.
 const NOTED_SQUARED_LENGTH_ERROR: f64 = 1.35e-2;
 
-/// Repairs `geometry` and adds what is missing; returns sentences about what was wrong.
+/// Repairs `geometry` and adds what is missing; returns sentences about what was wrong, each after its
+/// place below the primitive.
 pub(crate) fn finish(mut geometry: Geometry, needs: Needs) -> (Geometry, Vec<String>) {
     let mut remarks = Vec::new();
-    let mut remark = |count: usize, what: &str| {
+    let mut remark = |count: usize, place: &str, what: &str| {
         if count > 0 {
-            remarks.push(format!("{count} {what}"));
+            remarks.push(format!("{place}: {count} {what}"));
         }
     };
-    remark(geometry.odd_weight_count, "vertices have joint weights that are negative or whose sum is not 1");
-    remark(drop_non_finite_triangles(&mut geometry), "triangles with non-finite positions were dropped");
+    remark(
+        geometry.odd_weight_count,
+        "/attributes/WEIGHTS_0",
+        "vertices have joint weights that are negative or whose sum is not 1",
+    );
+    remark(
+        drop_non_finite_triangles(&mut geometry),
+        "/attributes/POSITION",
+        "triangles with non-finite positions were dropped",
+    );
     let (broken, outside) = repair_attributes(&mut geometry);
-    remark(broken, "vertices had non-finite texture coordinates or colours");
-    remark(outside, "vertices have colours outside 0 to 1; negative ones count as 0");
+    remark(broken, "", "vertices had non-finite texture coordinates or colours");
+    remark(outside, "/attributes/COLOR_0", "vertices have colours outside 0 to 1; negative ones count as 0");
     let had_indices = geometry.vertices.len() < geometry.indices.len();
     let mut split = false;
     if needs.normals && !geometry.has_normals {
@@ -46,10 +55,16 @@ pub(crate) fn finish(mut geometry: Geometry, needs: Needs) -> (Geometry, Vec<Str
         flat_normals(&mut geometry);
         split = true;
     } else if needs.normals {
+        let normal = "/attributes/NORMAL";
         let lengths = geometry.vertices.iter().map(|vertex| vertex.normal);
-        remark(lengths.filter(|&it| is_scaled(it)).count(), "normals did not have length 1 and were scaled");
+        remark(
+            lengths.filter(|&it| is_scaled(it)).count(),
+            normal,
+            "normals did not have length 1 and were scaled",
+        );
         remark(
             repair_normals(&mut geometry),
+            normal,
             "vertices without a usable normal got one from their triangles",
         );
     }
@@ -63,9 +78,13 @@ pub(crate) fn finish(mut geometry: Geometry, needs: Needs) -> (Geometry, Vec<Str
             let tangents = geometry.vertices.iter().map(|vertex| vertex.tangent);
             let wrong = |&[x, y, z, w]: &[f32; 4]| is_scaled([x, y, z]) || w.abs() != 1.0;
             let count = tangents.filter(wrong).count();
-            remark(count, "tangents did not have length 1 or a handedness of ±1 and were made so");
+            remark(
+                count,
+                "/attributes/TANGENT",
+                "tangents did not have length 1 or a handedness of ±1 and were made so",
+            );
         }
-        remark(repair_tangents(&mut geometry), "vertices without a usable tangent got an arbitrary one");
+        remark(repair_tangents(&mut geometry), "", "vertices without a usable tangent got an arbitrary one");
     }
     if split && had_indices {
         weld(&mut geometry);

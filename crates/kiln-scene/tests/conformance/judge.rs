@@ -84,7 +84,7 @@ fn has_place(error: &Diagnostic) -> bool {
         || text.starts_with("`asset` is missing")
 }
 
-/// Whether a message begins with the pointer, one above or one below it.
+/// Whether a message begins with the pointer, the one above or any below it.
 fn is_about(message: &str, pointer: &str) -> bool {
     // Faults of the container have no pointer.
     if pointer.is_empty() && message.starts_with("byte ") {
@@ -97,7 +97,9 @@ fn is_about(message: &str, pointer: &str) -> bool {
     let within = |inner: &str, outer: &str| {
         inner.strip_prefix(outer).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
     };
-    within(place, pointer) || within(pointer, place)
+    let above = pointer.rsplit_once('/').map_or("", |(above, _)| above);
+    // What is not drawn as a whole is not drawn wrong.
+    within(place, pointer) || place == above || within(pointer, place) && message.contains("is not drawn")
 }
 
 /// What became of all faults.
@@ -159,6 +161,7 @@ fn judge_wants_a_word_about_the_very_place() {
     assert_eq!(about("/nodes/1: wrong"), Some(Outcome::Noted));
     assert_eq!(about("/nodes/1/mesh/x: wrong"), Some(Outcome::Noted));
     assert_eq!(about("/nodes/12: wrong"), None);
+    assert_eq!(about("/nodes: wrong"), None);
     assert_eq!(about("something is wrong"), None);
     assert_eq!(judge(&fault, &[Diagnostic::new(Severity::Error, "no place")]), None);
 }
