@@ -46,7 +46,7 @@ pub(crate) fn pose(root: &Root, blinking: &BTreeSet<usize>) -> Result<Pose, Scen
         // No product for a top node: a product with the identity may change the sign of a zero.
         worlds[node] = parents[node].map_or(local, |parent| worlds[parent] * local);
     }
-    let (listed, note) = listed_nodes(root, &tops)?;
+    let (listed, note) = listed_nodes(root, &tops, &parents)?;
     let visible = |node: usize| root.nodes[node].extensions.visibility.is_none_or(|it| it.visible);
     let shown = depth_first(&root.nodes, &listed, visible);
     let may_show = |node: usize| visible(node) || blinking.contains(&node);
@@ -88,7 +88,11 @@ fn depth_first(nodes: &[Node], tops: &[usize], enter: impl Fn(usize) -> bool) ->
     order
 }
 
-fn listed_nodes(root: &Root, tops: &[usize]) -> Result<(Vec<usize>, Option<String>), SceneError> {
+fn listed_nodes(
+    root: &Root,
+    tops: &[usize],
+    parents: &[Option<usize>],
+) -> Result<(Vec<usize>, Option<String>), SceneError> {
     let index = root.scene.unwrap_or(0);
     let Some(scene) = root.scenes.get(index) else {
         if root.scene.is_some() {
@@ -108,7 +112,7 @@ fn listed_nodes(root: &Root, tops: &[usize]) -> Result<(Vec<usize>, Option<Strin
         if std::mem::replace(slot, true) {
             return Err(SceneError::new(place(), format!("node {node} is listed twice")));
         }
-        if !tops.contains(&node) {
+        if parents[node].is_some() {
             return Err(SceneError::new(place(), format!("node {node} is the child of another node")));
         }
     }

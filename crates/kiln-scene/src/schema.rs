@@ -4,8 +4,12 @@
 //! Defaults are the specification's; a property at its default is not written.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
+use serde::de::{Deserializer, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize};
+
+use crate::limits;
 
 pub(crate) use crate::schema::animation::*;
 pub(crate) use crate::schema::material::*;
@@ -35,7 +39,7 @@ pub(crate) struct Root {
     pub skins: Vec<Skin>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub animations: Vec<Animation>,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, deserialize_with = "few_materials", skip_serializing_if = "Vec::is_empty")]
     pub materials: Vec<Material>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub textures: Vec<Texture>,
@@ -321,6 +325,30 @@ pub(crate) struct Buffer {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub uri: Option<String>,
     pub byte_length: u64,
+}
+
+/// Stops at the limit, before memory for more is taken.
+fn few_materials<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Material>, D::Error> {
+    struct Few;
+    impl<'de> Visitor<'de> for Few {
+        type Value = Vec<Material>;
+
+        fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+            write!(formatter, "at most {} materials", limits::MATERIAL_COUNT_MAX)
+        }
+
+        fn visit_seq<A: SeqAccess<'de>>(self, mut sequence: A) -> Result<Vec<Material>, A::Error> {
+            let mut materials = Vec::new();
+            while let Some(material) = sequence.next_element()? {
+                if materials.len() >= limits::MATERIAL_COUNT_MAX {
+                    return Err(serde::de::Error::invalid_length(materials.len() + 1, &self));
+                }
+                materials.push(material);
+            }
+            Ok(materials)
+        }
+    }
+    deserializer.deserialize_seq(Few)
 }
 
 pub(crate) fn is_default<T: Default + PartialEq>(value: &T) -> bool {

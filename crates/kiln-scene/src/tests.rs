@@ -2,6 +2,7 @@
 
 mod animation;
 mod build;
+mod conform;
 mod corpus;
 mod effects;
 mod geometry;

@@ -29,7 +29,7 @@ const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 /// The scene's bytes. Serialising cannot fail: the types hold no maps with keys other than text, and the
 /// import leaves no number that JSON cannot say.
 pub(crate) fn write(imported: &Imported) -> Result<Vec<u8>, serde_json::Error> {
-    let mut writer = Writer { root: Root::default(), bin: Vec::new() };
+    let mut writer = Writer { root: Root::default(), bin: Vec::with_capacity(size_at_most(imported)) };
     let notes = &imported.scene.notes;
     writer.root.asset = Asset {
         version: "2.0".into(),
@@ -59,7 +59,17 @@ pub(crate) fn write(imported: &Imported) -> Result<Vec<u8>, serde_json::Error> {
     if !writer.bin.is_empty() {
         writer.root.buffers.push(Buffer { uri: None, byte_length: writer.bin.len() as u64 });
     }
-    Ok(join(&serde_json::to_vec(&writer.root)?, &writer.bin))
+    Ok(join(serde_json::to_vec(&writer.root)?, writer.bin))
+}
+
+/// A bound of the GLB's size, but for its JSON; memory that is not written to costs nothing.
+fn size_at_most(imported: &Imported) -> usize {
+    const FRONT: usize = 1 << 20;
+    let geometry = imported.scene.primitives.iter();
+    let geometry = geometry.map(|it| it.vertices.len() * size_of::<Vertex>() + it.indices.len() * 4 + 8);
+    FRONT
+        + geometry.sum::<usize>()
+        + imported.pictures.iter().map(|(_, bytes)| bytes.len() + 4).sum::<usize>()
 }
 
 pub(crate) struct Writer {
@@ -69,10 +79,20 @@ pub(crate) struct Writer {
 
 impl Writer {
     pub fn view(&mut self, bytes: &[u8], byte_stride: Option<u64>, target: Option<u32>) -> usize {
+        self.view_of(byte_stride, target, |bin| bin.extend_from_slice(bytes))
+    }
+
+    /// A view of what `append` appends, so that large data needs no buffer of its own.
+    fn view_of(
+        &mut self,
+        byte_stride: Option<u64>,
+        target: Option<u32>,
+        append: impl FnOnce(&mut Vec<u8>),
+    ) -> usize {
         self.bin.resize(self.bin.len().next_multiple_of(4), 0);
-        let byte_offset = self.bin.len() as u64;
-        self.bin.extend_from_slice(bytes);
-        let byte_length = bytes.len() as u64;
+        let start = self.bin.len();
+        append(&mut self.bin);
+        let (byte_offset, byte_length) = (start as u64, (self.bin.len() - start) as u64);
         let view = BufferView { byte_offset, byte_length, byte_stride, target, ..BufferView::default() };
         self.root.buffer_views.push(view);
         self.root.buffer_views.len() - 1
@@ -86,13 +106,13 @@ impl Writer {
     fn mesh(&mut self, primitive: &crate::Primitive, materials: &[&Material]) {
         let columns = columns(&primitive.vertices, materials);
         let width: usize = columns.iter().map(|column| column.width).sum();
-        let mut bytes = Vec::with_capacity(primitive.vertices.len() * width * 4);
-        for vertex in &primitive.vertices {
-            for column in &columns {
-                bytes.extend_from_slice(bytemuck::cast_slice(&(column.read)(vertex)[..column.width]));
+        let view = self.view_of(Some(4 * width as u64), Some(ARRAY_BUFFER), |bin| {
+            for vertex in &primitive.vertices {
+                for column in &columns {
+                    bin.extend_from_slice(bytemuck::cast_slice(&(column.read)(vertex)[..column.width]));
+                }
             }
-        }
-        let view = self.view(&bytes, Some(4 * width as u64), Some(ARRAY_BUFFER));
+        });
         let mut attributes = BTreeMap::new();
         let mut byte_offset = 0;
         for column in &columns {
@@ -120,12 +140,13 @@ impl Writer {
     fn indices(&mut self, indices: &[u32], vertex_count: usize) -> usize {
         // 65535 itself is reserved for primitive restart.
         let narrow = vertex_count <= usize::from(u16::MAX);
-        let bytes: Vec<u8> = if narrow {
-            indices.iter().flat_map(|&index| (index as u16).to_le_bytes()).collect()
-        } else {
-            indices.iter().flat_map(|index| index.to_le_bytes()).collect()
-        };
-        let view = self.view(&bytes, None, Some(ELEMENT_ARRAY_BUFFER));
+        let view = self.view_of(None, Some(ELEMENT_ARRAY_BUFFER), |bin| {
+            if narrow {
+                indices.iter().for_each(|&index| bin.extend_from_slice(&(index as u16).to_le_bytes()));
+            } else {
+                indices.iter().for_each(|index| bin.extend_from_slice(&index.to_le_bytes()));
+            }
+        });
         self.accessor(Accessor {
             buffer_view: Some(view),
             byte_offset: 0,

@@ -46,7 +46,8 @@ fn zero_normal_is_replaced_by_its_triangles() {
     assert_eq!(normals[0], [0.0, 0.0, 1.0]);
     check_within("made unit", &normals[1], &[0.0, 0.6, 0.8], 1e-6);
     assert_eq!(normals[2], [0.0, 0.0, 1.0]);
-    assert!(scene.notes[0].contains("2 vertices without a usable normal"), "{:?}", scene.notes);
+    assert!(scene.notes[0].contains("1 normals did not have length 1"), "{:?}", scene.notes);
+    assert!(scene.notes[1].contains("2 vertices without a usable normal"), "{:?}", scene.notes);
 }
 
 #[test]
@@ -135,6 +136,24 @@ fn skinned_vertices_follow_their_joints_and_not_their_node() {
         scene.primitives[0].vertices.iter().map(|vertex| vertex.position).collect();
     assert_eq!(positions, [[0.0, 10.0, 0.0], [2.0, 10.0, 4.0], [0.0, 11.0, 2.0]]);
     assert_eq!(scene.draws[0].world, glam::Mat4::IDENTITY);
+}
+
+#[test]
+fn joint_weights_that_do_not_sum_up_to_one_are_noted() {
+    let notes = |weight: f32| {
+        let mut file = File::triangle();
+        let joints = file.accessor(&[0; 12], 5121, 3, "VEC4");
+        let weights = file.floats(&[[1.0, 0.0, 0.0, 0.0], [weight, 0.5, 0.0, 0.0], [weight, 0.5, 0.0, 0.0]]);
+        let primitive = file.primitive();
+        primitive["attributes"]["JOINTS_0"] = json!(joints);
+        primitive["attributes"]["WEIGHTS_0"] = json!(weights);
+        file.root["skins"] = json!([{"joints": [0]}]);
+        file.root["nodes"][0]["skin"] = json!(0);
+        scene_of(&file.bytes()).notes
+    };
+    assert_eq!(notes(0.5), [""; 0]);
+    assert!(notes(0.25)[0].contains("2 vertices have joint weights"), "{:?}", notes(0.25));
+    assert!(notes(-0.5)[0].contains("2 vertices have joint weights"), "{:?}", notes(-0.5));
 }
 
 #[test]
