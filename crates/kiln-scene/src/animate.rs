@@ -1,4 +1,5 @@
 //! Reads a file's animations. One that is wrong is left out with a warning: the rest pose needs none of them.
+//! Warnings have the places of `conform/animations`, whose word on the same place then is not needed.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -33,9 +34,10 @@ pub(crate) fn read(data: &Data<'_>) -> Motion {
         match reader.animation(index, source) {
             Ok(animation) if animation.channels.is_empty() => {}
             Ok(animation) => motion.animations.push(animation),
-            Err(error) => {
+            Err(error) if motion.warnings.len() < limits::NOTE_COUNT_MAX => {
                 motion.warnings.push(error.with_help("the animation is left out, the rest pose is drawn"));
             }
+            Err(_) => {}
         }
     }
     motion.notes = reader.notes;
@@ -166,7 +168,7 @@ impl Reader<'_, '_> {
         let place = format!("/animations/{index}");
         let mut animation =
             Animation { name: source.name.clone().unwrap_or_default(), ..Animation::default() };
-        let (mut known, mut seen) = (BTreeMap::new(), BTreeSet::new());
+        let (mut known, mut seen) = (BTreeMap::new(), BTreeMap::new());
         for (at, channel) in source.channels.iter().enumerate() {
             let user = format!("{place}/channels/{at}");
             self.channels_left = self.channels_left.checked_sub(1).ok_or_else(|| {
@@ -178,8 +180,9 @@ impl Reader<'_, '_> {
                 SceneError::new(format!("{user}/sampler"), reason)
             })?;
             let Some(target) = self.target(channel, &user)? else { continue };
-            if !seen.insert(target) {
-                return Err(SceneError::new(format!("{user}/target"), "an earlier channel already moves it"));
+            if let Some(first) = seen.insert(target, at) {
+                let reason = format!("channel {at} moves the same");
+                return Err(SceneError::new(format!("{place}/channels/{first}/target"), reason));
             }
             let shape = self.shape(target, sampler, &user)?;
             let curve = match known.get(&(channel.sampler, shape)) {
@@ -189,6 +192,7 @@ impl Reader<'_, '_> {
                         sampler,
                         shape,
                         &format!("{place}/samplers/{}", channel.sampler),
+                        &format!("{user}/sampler"),
                     )?);
                     known.insert((channel.sampler, shape), animation.curves.len() - 1);
                     animation.curves.len() - 1
@@ -226,7 +230,11 @@ impl Reader<'_, '_> {
                 return Err(SceneError::new(format!("{user}/target/path"), reason));
             }
         };
-        check_node(root, found, node, &format!("{user}/target/node"))?;
+        if node >= root.nodes.len() {
+            let reason = format!("node {node} does not exist, the file has {}", root.nodes.len());
+            return Err(SceneError::new(format!("{user}/target/node"), reason));
+        }
+        check_movable(root, found, node, &format!("{user}/target"))?;
         Ok(Some(found))
     }
 
@@ -262,11 +270,18 @@ impl Reader<'_, '_> {
         if count > 0 {
             Ok(count)
         } else {
-            Err(SceneError::new(format!("{user}/target/node"), format!("node {node} has no morph targets")))
+            Err(SceneError::new(format!("{user}/target"), format!("node {node} has no morph targets")))
         }
     }
 
-    fn curve(&mut self, sampler: &AnimationSampler, shape: Shape, place: &str) -> Result<Curve, SceneError> {
+    /// `place` is the sampler's, `user` that of the channel that wants it.
+    fn curve(
+        &mut self,
+        sampler: &AnimationSampler,
+        shape: Shape,
+        place: &str,
+        user: &str,
+    ) -> Result<Curve, SceneError> {
         let interpolation = interpolation(sampler, place)?;
         if shape.is_flag && interpolation != Interpolation::Step {
             return Err(SceneError::new(
@@ -281,10 +296,8 @@ impl Reader<'_, '_> {
         let wanted = if shape.is_list { rows.saturating_mul(shape.width as u64) } else { rows };
         let actual = self.data.count(sampler.output, &output)?;
         if actual != wanted {
-            return Err(SceneError::new(
-                output,
-                format!("{actual} values, {wanted} are needed for {key_count} times"),
-            ));
+            let reason = format!("{actual} values, {wanted} are needed for {key_count} times");
+            return Err(SceneError::new(user, reason));
         }
         let cost = key_count.saturating_add(rows.saturating_mul(shape.width as u64));
         let left = usize::try_from(cost).ok().and_then(|cost| self.values_left.checked_sub(cost));
@@ -296,59 +309,66 @@ impl Reader<'_, '_> {
         if interpolation == Interpolation::CubicSpline && times_s.len() < 2 {
             return Err(SceneError::new(input, "a spline needs two times"));
         }
-        let values = self.values(sampler.output, &output, shape)?;
+        let values = self.values(sampler.output, user, shape)?;
         Ok(Curve { interpolation, is_rotation: shape.is_rotation, times_s, width: shape.width, values })
     }
 
     fn times(&self, index: usize, user: &str) -> Result<Vec<f32>, SceneError> {
-        let accessor = format!("/accessors/{index}");
-        if !self.data.is_float(index) {
-            return Err(SceneError::new(accessor, "times must be floats"));
+        if !self.data.is_float(index) || self.data.root.accessors[index].kind != "SCALAR" {
+            return Err(SceneError::new(user, format!("accessor {index}: times must be float scalars")));
         }
         let times = self.data.floats::<1>(index, user, &["SCALAR"], [0.0])?.concat();
         let Some(&first) = times.first() else {
-            return Err(SceneError::new(accessor, "an animation needs a time"));
+            let count = format!("/accessors/{index}/count");
+            return Err(SceneError::new(count, "an animation needs a time"));
         };
         if !(first >= 0.0 && times.iter().all(|time| time.is_finite())) {
-            return Err(SceneError::new(accessor, "times must be finite and not negative"));
+            let reason = format!("accessor {index}: times must be finite and not negative");
+            return Err(SceneError::new(user, reason));
         }
         match times.windows(2).position(|pair| pair[0] >= pair[1]) {
             None => Ok(times),
             Some(at) => {
                 let reason = format!(
-                    "time {} s (number {}) does not come after {} s",
+                    "accessor {index}: time {} s (number {}) does not come after {} s",
                     times[at + 1],
                     at + 1,
                     times[at]
                 );
-                Err(SceneError::new(accessor, reason))
+                Err(SceneError::new(user, reason))
             }
         }
     }
 
     fn values(&self, index: usize, user: &str, shape: Shape) -> Result<Vec<f32>, SceneError> {
-        let accessor = format!("/accessors/{index}");
-        let fits = if shape.is_flag {
+        let kind = match (shape.is_list, shape.width) {
+            (true, _) | (_, 1) => "SCALAR",
+            (_, 2) => "VEC2",
+            (_, 3) => "VEC3",
+            _ => "VEC4",
+        };
+        let is_format = if shape.is_flag {
             self.data.is_byte(index)
         } else {
             self.data.is_float(index) || self.data.is_normalized(index)
         };
-        if !fits {
+        if !is_format || self.data.root.accessors[index].kind != kind {
             let wanted = if shape.is_flag { "unsigned bytes" } else { "floats or normalised integers" };
-            return Err(SceneError::new(accessor, format!("the values must be {wanted}")));
+            let reason = format!("accessor {index}: the values must be {kind} of {wanted}");
+            return Err(SceneError::new(user, reason));
         }
-        let values = match (shape.is_list, shape.width) {
-            (true, _) | (_, 1) => self.data.floats::<1>(index, user, &["SCALAR"], [0.0])?.concat(),
-            (_, 2) => self.data.floats::<2>(index, user, &["VEC2"], [0.0; 2])?.concat(),
-            (_, 3) => self.data.floats::<3>(index, user, &["VEC3"], [0.0; 3])?.concat(),
-            _ => self.data.floats::<4>(index, user, &["VEC4"], [0.0; 4])?.concat(),
+        let values = match kind {
+            "SCALAR" => self.data.floats::<1>(index, user, &[kind], [0.0])?.concat(),
+            "VEC2" => self.data.floats::<2>(index, user, &[kind], [0.0; 2])?.concat(),
+            "VEC3" => self.data.floats::<3>(index, user, &[kind], [0.0; 3])?.concat(),
+            _ => self.data.floats::<4>(index, user, &[kind], [0.0; 4])?.concat(),
         };
         match values.iter().position(|value| !value.is_finite()) {
             None if shape.is_flag => {
                 Ok(values.into_iter().map(|flag| f32::from(u8::from(flag != 0.0))).collect())
             }
             None => Ok(values),
-            Some(at) => Err(SceneError::new(accessor, format!("number {at} is not finite"))),
+            Some(at) => Err(SceneError::new(user, format!("accessor {index}: number {at} is not finite"))),
         }
     }
 }
@@ -374,14 +394,10 @@ fn morphed_node(root: &Root, target: &schema::ChannelTarget) -> Option<usize> {
     usize::try_from(node).ok()
 }
 
-fn check_node(root: &Root, target: Target, node: usize, place: &str) -> Result<(), SceneError> {
-    let count = root.nodes.len();
-    let Some(source) = root.nodes.get(node) else {
-        return Err(SceneError::new(place, format!("node {node} does not exist, the file has {count}")));
-    };
+fn check_movable(root: &Root, target: Target, node: usize, place: &str) -> Result<(), SceneError> {
     let sets_part =
         matches!(target, Target::Translation { .. } | Target::Rotation { .. } | Target::Scale { .. });
-    if sets_part && source.matrix.is_some() {
+    if sets_part && root.nodes[node].matrix.is_some() {
         return Err(SceneError::new(place, format!("node {node} has a matrix, so its parts cannot move")));
     }
     Ok(())
@@ -422,7 +438,7 @@ fn pointed(root: &Root, pointer: &str, place: &str) -> Result<Option<Target>, Sc
             .map(|property| Target::Light { light: index, property }),
     };
     if let Some((target, node)) = target.and_then(|target| Some((target, node_of(target)?))) {
-        check_node(root, target, node, place)?;
+        check_movable(root, target, node, place)?;
     }
     Ok(target)
 }

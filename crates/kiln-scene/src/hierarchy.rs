@@ -16,10 +16,20 @@ pub(crate) struct Hierarchy {
     pub nodes: Vec<Node>,
     /// Kept node by the file's node.
     pub kept: BTreeMap<usize, usize>,
-    /// Where every node of the file stands.
-    pub places: Vec<Place>,
+    /// The file's nodes that move.
+    held: BTreeMap<usize, Held>,
     /// Whether a channel names the kept node or one that it hangs on.
     moves: Vec<bool>,
+}
+
+/// A node of the file that moves.
+#[derive(Clone, Copy, Debug)]
+struct Held {
+    /// Kept node that carries it, and the file's number of that.
+    kept: usize,
+    carrier: usize,
+    /// What the nodes between the two do, in full precision.
+    local: DMat4,
 }
 
 /// Where something stands, and what carries it there.
@@ -62,31 +72,42 @@ pub(crate) fn hierarchy(root: &Root, pose: &Pose, named: &BTreeSet<usize>) -> Hi
         });
         hierarchy.moves.push(moves);
     }
-    hierarchy.places = places(root, pose, &hierarchy);
+    hierarchy.held = held(root, pose, &hierarchy);
     hierarchy
 }
 
-/// Where every node of the file stands.
-fn places(root: &Root, pose: &Pose, hierarchy: &Hierarchy) -> Vec<Place> {
-    let mut places: Vec<Place> = pose.worlds.iter().map(|&world| Place::still(world)).collect();
-    // What the nodes between a node and the one that carries it do, in full precision.
-    let mut locals = vec![DMat4::IDENTITY; places.len()];
+/// Nodes that move; large files have few, so the others take no memory.
+fn held(root: &Root, pose: &Pose, hierarchy: &Hierarchy) -> BTreeMap<usize, Held> {
+    let mut found = BTreeMap::new();
     for &node in &pose.order {
         if let Some(&kept) = hierarchy.kept.get(&node) {
             if hierarchy.moves[kept] {
-                places[node] = Place { node: Some(kept), base: pose.worlds[node], local: DMat4::IDENTITY };
+                found.insert(node, Held { kept, carrier: node, local: DMat4::IDENTITY });
             }
             continue;
         }
-        let Some(parent) = pose.parents[node] else { continue };
-        if places[parent].node.is_some() {
+        let parent = pose.parents[node].and_then(|parent| Some((parent, *found.get(&parent)?)));
+        if let Some((parent, above)) = parent {
             let local = local_matrix(&root.nodes[node]);
-            let is_child = hierarchy.kept.contains_key(&parent);
-            locals[node] = if is_child { local } else { locals[parent] * local };
-            places[node] = Place { local: rounded(locals[node]), ..places[parent] };
+            // No product for a child: a product with the identity may change the sign of a zero.
+            let local = if above.carrier == parent { local } else { above.local * local };
+            found.insert(node, Held { local, ..above });
         }
     }
-    places
+    found
+}
+
+impl Hierarchy {
+    /// Where a node of the file stands.
+    pub fn place(&self, pose: &Pose, node: usize) -> Place {
+        match self.held.get(&node) {
+            None => Place::still(pose.worlds[node]),
+            Some(held) => {
+                let base = pose.worlds[held.carrier];
+                Place { node: Some(held.kept), base, local: rounded(held.local) }
+            }
+        }
+    }
 }
 
 impl Place {

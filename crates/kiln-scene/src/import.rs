@@ -55,7 +55,9 @@ pub(crate) fn import(
     let pose = pose(root, &motion.blinking()).map_err(|error| vec![error])?;
     // A pack of this crate is as it should be, but for matrices that shear as its source does.
     let is_pack = remembered_notes(root).is_some();
-    let faults = if is_pack { Vec::new() } else { conform::check(&document.json, &data) };
+    let mut faults = if is_pack { Vec::new() } else { conform::check(&document.json, &data) };
+    // What is left out because of a fault is said there, and once.
+    faults.retain(|fault| motion.warnings.iter().all(|warning| warning.pointer != fault.pointer));
     let textures = TextureTable::new(file, &data, resolve);
     let importer = Importer {
         data: &data,
@@ -196,7 +198,7 @@ impl Importer<'_, '_> {
 
     fn add_node(&mut self, index: usize) -> Result<(), SceneError> {
         let (root, node) = (self.data.root, &self.data.root.nodes[index]);
-        let place = self.hierarchy.places[index];
+        let place = self.hierarchy.place(self.pose, index);
         if let Some(at) = node.camera {
             let (camera, source) = rig::camera(root, index, at, place.world())?;
             self.cameras.push((place, FoundCamera { index: at, camera, source }));
@@ -213,7 +215,7 @@ impl Importer<'_, '_> {
     fn add_shape(&mut self, index: usize, shown: bool) -> Result<(), SceneError> {
         let node = &self.data.root.nodes[index];
         let Some(mesh) = node.mesh else { return Ok(()) };
-        let place = self.hierarchy.places[index];
+        let place = self.hierarchy.place(self.pose, index);
         let name = node.name.clone().unwrap_or_else(|| format!("node {index}"));
         match &node.extensions.instancing {
             None => self.add_mesh(index, mesh, &Standing { place, name, shown }),

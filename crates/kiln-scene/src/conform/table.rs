@@ -343,6 +343,28 @@ const fn extension(name: &'static str, home: &'static str, kind: &'static Kind) 
     Extension { name, home, kind }
 }
 
+static VARIANTS: Kind = Kind::Object(
+    "",
+    &[must("variants", &Kind::List(&Kind::Object("variant", &[must("name", &Kind::Text)]), 1))],
+);
+
+static VARIANT_MAPPINGS: Kind = Kind::Object(
+    "",
+    &[must(
+        "mappings",
+        &Kind::List(
+            &Kind::Object(
+                "variant mapping",
+                &[
+                    must("material", &Kind::Index("materials")),
+                    must("variants", &Kind::List(&Kind::Index("variants"), 1)),
+                ],
+            ),
+            1,
+        ),
+    )],
+);
+
 pub(super) static EXTENSIONS: &[Extension] = &[
     extension("EXT_mesh_gpu_instancing", "node", &Kind::Object("", &[must("attributes", &ATTRIBUTES)])),
     extension("EXT_texture_webp", "texture", &Kind::Object("", &[may("source", &Kind::Index("images"))])),
@@ -365,8 +387,8 @@ pub(super) static EXTENSIONS: &[Extension] = &[
     extension("KHR_materials_specular", "material", &SPECULAR),
     extension("KHR_materials_transmission", "material", &TRANSMISSION),
     extension("KHR_materials_unlit", "material", &Kind::Object("", &[])),
-    extension("KHR_materials_variants", "root", &Kind::Any),
-    extension("KHR_materials_variants", "primitive", &Kind::Any),
+    extension("KHR_materials_variants", "root", &VARIANTS),
+    extension("KHR_materials_variants", "primitive", &VARIANT_MAPPINGS),
     extension("KHR_materials_volume", "material", &VOLUME),
     extension("KHR_mesh_quantization", "nowhere", &Kind::Any),
     extension("KHR_node_visibility", "node", &Kind::Object("", &[may("visible", &Kind::Bool)])),

@@ -77,9 +77,15 @@ impl Walker<'_, '_> {
         }
     }
 
+    /// An extension of the whole file.
+    fn extension(&self, name: &str) -> Option<&Json<'_>> {
+        self.root.get("extensions").and_then(|it| it.get(name))
+    }
+
     fn index(&mut self, value: &Json<'_>, table: &str) {
         let table_json = match table {
-            "lights" => self.root.get("extensions").and_then(|it| it.get("KHR_lights_punctual")),
+            "lights" => self.extension("KHR_lights_punctual"),
+            "variants" => self.extension("KHR_materials_variants"),
             _ => Some(self.root),
         };
         let count = table_json.map_or(0, |it| it.table(table).len());

@@ -88,7 +88,7 @@ fn references_into_nowhere_are_said_although_nothing_is_drawn_of_them() {
     check_said(
         "/animations/0/samplers/0/input",
         json!(99),
-        "/animations/0/samplers/0/input: 99 does not exist",
+        "/animations/0/samplers/0/input: accessor 99 does not exist",
     );
     check_said("/animations/0/channels/0/sampler", json!(7), "/animations/0/channels/0/sampler: sampler 7");
     check_said("/skins/0/joints", json!([9]), "/skins/0/joints/0: 9 does not exist");
@@ -101,23 +101,23 @@ fn animations_that_cannot_be_right_are_said() {
     check_said(
         "/animations/0/channels",
         json!([channel, channel]),
-        "/animations/0/channels/0/target: /animations/0/channels/1/target is the same target",
+        "/animations/0/channels/0/target: channel 1 moves the same",
     );
     check_said(
         "/animations/0/channels/0/target/path",
         json!("scale"),
-        "/animations/0/channels/0/sampler: VEC4 5126 is no format of `scale`",
+        "/animations/0/channels/0/sampler: accessor 4: the values must be VEC3",
     );
     check_said(
         "/animations/0/samplers/0/interpolation",
         json!("CUBICSPLINE"),
-        "/animations/0/channels/0/sampler: 2 values for 2 keys, 6 are wanted",
+        "/animations/0/channels/0/sampler: 2 values, 6 are needed for 2 times",
     );
     let mut file = sound();
     let times = file.accessor(&floats(&[1.0, 1.0]), 5126, 2, "SCALAR");
     file.root["animations"][0]["samplers"][0]["input"] = json!(times);
     let found = findings(&file.bytes());
-    assert!(found.iter().any(|it| it.contains("1 times are not after the one before")), "{found:#?}");
+    assert!(found.iter().any(|it| it.contains("time 1 s (number 1) does not come after 1 s")), "{found:#?}");
 }
 
 #[test]

@@ -336,6 +336,10 @@ fn check_left_out(file: File, wanted: &[&str]) {
         assert!(message.contains(wanted), "{wanted:?} is not in:\n{message}");
     }
     assert!(message.contains("the animation is left out"), "{message}");
+    // Findings do not say it a second time.
+    let place = packed.diagnostics[0].message.split_inclusive(": ").next().unwrap_or_default();
+    let again = packed.diagnostics[1..].iter().filter(|it| it.message.starts_with(place));
+    assert_eq!(again.count(), 0, "{:?}", packed.diagnostics);
 }
 
 #[test]
@@ -348,19 +352,25 @@ fn broken_animations_are_left_out_with_a_place() {
     assert_eq!(scene_of(&moved(&[0.0, 1.0], &[0.0; 6], "VEC3").bytes()).animations.len(), 1, "the sound one");
     check_left_out(
         moved(&[1.0, 1.0], &[0.0; 6], "VEC3"),
-        &["/accessors/3", "time 1 s (number 1) does not come after 1 s"],
+        &["/animations/0/samplers/0/input", "accessor 3: time 1 s (number 1) does not come after 1 s"],
     );
-    check_left_out(moved(&[-1.0, 1.0], &[0.0; 6], "VEC3"), &["/accessors/3", "finite and not negative"]);
-    check_left_out(moved(&[0.0, f32::NAN], &[0.0; 6], "VEC3"), &["/accessors/3"]);
+    check_left_out(
+        moved(&[-1.0, 1.0], &[0.0; 6], "VEC3"),
+        &["/samplers/0/input", "accessor 3: times must be finite"],
+    );
+    check_left_out(moved(&[0.0, f32::NAN], &[0.0; 6], "VEC3"), &["/samplers/0/input", "finite"]);
     check_left_out(
         moved(&[0.0, 1.0], &[0.0; 3], "VEC3"),
-        &["/animations/0/samplers/0/output", "1 values, 2 are needed"],
+        &["/animations/0/channels/0/sampler", "1 values, 2 are needed"],
     );
     check_left_out(
         moved(&[0.0], &[f32::INFINITY, 0.0, 0.0], "VEC3"),
-        &["/accessors/4", "number 0 is not finite"],
+        &["/channels/0/sampler", "accessor 4: number 0 is not finite"],
     );
-    check_left_out(moved(&[0.0], &[0.0; 4], "VEC4"), &["/accessors/4/type", "expected VEC3"]);
+    check_left_out(
+        moved(&[0.0], &[0.0; 4], "VEC4"),
+        &["/channels/0/sampler", "accessor 4: the values must be VEC3"],
+    );
     let broken = |path: &[&str], value: Value| {
         let mut file = moved(&[0.0, 1.0], &[0.0; 6], "VEC3");
         let mut at = &mut file.root["animations"][0];
@@ -391,7 +401,7 @@ fn broken_animations_are_left_out_with_a_place() {
     );
     check_left_out(broken(&["samplers", "0", "input"], json!(99)), &["/samplers/0/input", "accessor 99"]);
     let twice = json!([{"sampler": 0, "target": {"node": 0, "path": "translation"}}, {"sampler": 0, "target": {"node": 0, "path": "translation"}}]);
-    check_left_out(broken(&["channels"], twice), &["/channels/1/target", "an earlier channel"]);
+    check_left_out(broken(&["channels"], twice), &["/channels/0/target", "channel 1 moves the same"]);
     let mut matrix = moved(&[0.0], &[0.0; 3], "VEC3");
     matrix.root["nodes"][0]["matrix"] = json!(glam::Mat4::IDENTITY.to_cols_array());
     check_left_out(matrix, &["node 0 has a matrix"]);

@@ -186,7 +186,8 @@ fn every_file_with_a_validator_error_is_refused_noted_or_has_a_reason() {
 
 /// Valid files have pictures in formats of extensions, which are not drawn.
 fn is_about_a_format(message: &str) -> bool {
-    message.starts_with("/textures/") || message.contains("the image cannot be read")
+    message.contains("has its image, which is not supported")
+        || message.contains("it is none of PNG, JPEG and WebP")
 }
 
 fn files_below(folder: &Path, list: &mut Vec<PathBuf>) {
