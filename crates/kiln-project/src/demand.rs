@@ -96,9 +96,8 @@ fn env_demand(project: &Project, name: &str, env: &EnvConfig, scenes: &[SceneDem
     let count = env.level_count();
     let mut demand =
         EnvDemand { light: Vec::new(), specular: vec![Vec::new(); count], sheen: vec![Vec::new(); count] };
-    let every_level = |levels: &mut Vec<Reasons>, reason: &str| {
-        levels.iter_mut().for_each(|level| level.push(reason.into()))
-    };
+    let every_level =
+        |levels: &mut Vec<Reasons>, reason: &str| levels.iter_mut().for_each(|level| level.push(reason.into()));
     if env.has_sheen {
         every_level(&mut demand.sheen, "`sheen = true`");
     }
@@ -124,8 +123,7 @@ fn env_demand(project: &Project, name: &str, env: &EnvConfig, scenes: &[SceneDem
             if let Some([low, high]) = material.reads.ggx.map(|interval| interval.map(f64::from)) {
                 demand.light.push(who.clone());
                 let widest = filtered(high);
-                let reason =
-                    format!("{who}, {}, filtered up to {widest:.2}", interval_text("roughness", low, high));
+                let reason = format!("{who}, {}, filtered up to {widest:.2}", interval_text("roughness", low, high));
                 for level in read_levels(env, [low, widest]) {
                     demand.specular[level].push(reason.clone());
                 }
@@ -145,9 +143,7 @@ fn env_demand(project: &Project, name: &str, env: &EnvConfig, scenes: &[SceneDem
 /// Textures and their files have no gaps between levels.
 fn close_gaps(chain: &mut [Reasons]) {
     let is_read = |reasons: &Reasons| !reasons.is_empty();
-    let (Some(first), Some(last)) = (chain.iter().position(is_read), chain.iter().rposition(is_read)) else {
-        return;
-    };
+    let (Some(first), Some(last)) = (chain.iter().position(is_read), chain.iter().rposition(is_read)) else { return };
     for level in &mut chain[first..=last] {
         if level.is_empty() {
             level.push("it lies between levels that are read".to_owned());
@@ -156,11 +152,7 @@ fn close_gaps(chain: &mut [Reasons]) {
 }
 
 fn interval_text(what: &str, low: f64, high: f64) -> String {
-    if (high - low).abs() < 1e-6 {
-        format!("{what} {low:.2}")
-    } else {
-        format!("{what} {low:.2} to {high:.2}")
-    }
+    if (high - low).abs() < 1e-6 { format!("{what} {low:.2}") } else { format!("{what} {low:.2} to {high:.2}") }
 }
 
 /// The roughness that filtering of normals makes of a roughness at most.
@@ -183,8 +175,7 @@ fn read_levels(env: &EnvConfig, [low, high]: [f64; 2]) -> std::ops::RangeInclusi
 impl EnvDemand {
     /// Whether anything but the skybox is read.
     pub fn is_light_read(&self) -> bool {
-        [&self.specular, &self.sheen].into_iter().flatten().any(|level| !level.is_empty())
-            || !self.light.is_empty()
+        [&self.specular, &self.sheen].into_iter().flatten().any(|level| !level.is_empty()) || !self.light.is_empty()
     }
 
     /// Whether any level of the Charlie chain is read.

@@ -15,8 +15,11 @@ pub(crate) const DEFAULT: LutConfig =
     LutConfig { table: Table::GgxScaleBias(Masking::SmithCorrelated), size: 128, axes: TableAxes::Uniform };
 
 /// The table that sheen is drawn with; `[lut.charlie]` replaces it.
-pub(crate) const CHARLIE: LutConfig =
-    LutConfig { table: Table::SheenAlbedo(SheenVisibility::Unclamped), size: 128, axes: TableAxes::Uniform };
+pub(crate) const CHARLIE: LutConfig = LutConfig {
+    table: Table::SheenAlbedo(SheenVisibility::Unclamped),
+    size: 128,
+    axes: TableAxes::Uniform,
+};
 
 /// Roughness from which on a table's stated error counts: what lookups are off by below it depends on no size.
 const ERROR_ROUGHNESS_MIN: f64 = 0.089;

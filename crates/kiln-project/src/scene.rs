@@ -9,10 +9,10 @@ use kiln_scene::{MaterialEffects, variant_name};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use crate::{EffectOverrides, SceneConfig, SceneDemand};
 use crate::environment::{command, failure};
 use crate::plan::{PartSpec, Planner, no_content, rank, unreadable};
 use crate::shader::Variants;
-use crate::{EffectOverrides, SceneConfig, SceneDemand};
 
 /// What a scan of a scene tells the planner.
 #[derive(Default, Serialize, Deserialize)]

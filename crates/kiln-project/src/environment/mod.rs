@@ -110,13 +110,7 @@ impl EnvPlan<'_, '_> {
     }
 
     /// Those levels of a chain that are read.
-    fn add_chain(
-        &mut self,
-        map: &'static str,
-        lobe: LobeKind,
-        analyse: ActionId,
-        levels: std::ops::Range<usize>,
-    ) {
+    fn add_chain(&mut self, map: &'static str, lobe: LobeKind, analyse: ActionId, levels: std::ops::Range<usize>) {
         let Steps { name, env } = self.steps;
         let count = env.level_count();
         let (mut parts, mut subjects) = (Vec::new(), Vec::new());
@@ -131,11 +125,7 @@ impl EnvPlan<'_, '_> {
             let action = self.steps.level(map, lobe, self.decode, analyse, level);
             let action = self.planner.graph.add(action);
             parts.push(level_part(action, level));
-            subjects.push(Subject {
-                level: action,
-                lobe: lobe.of()(roughness),
-                face_size: env.face_size(level),
-            });
+            subjects.push(Subject { level: action, lobe: lobe.of()(roughness), face_size: env.face_size(level) });
         }
         if !subjects.is_empty() {
             parts.push(self.measure(map, subjects));
