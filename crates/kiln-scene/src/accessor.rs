@@ -84,9 +84,6 @@ pub(crate) struct Data<'a> {
     pub buffers: Vec<Blob<'a>>,
 }
 
-/// Turns the bytes of one component into a value.
-type ReadComponent<'a, T> = &'a dyn Fn(Component, &[u8]) -> Result<T, SceneError>;
-
 /// How one element lies in memory.
 struct Layout<'a> {
     /// `None`: all zeros.
@@ -164,7 +161,80 @@ impl<'a> Data<'a> {
         Ok(self.accessor(index, user)?.count)
     }
 
-    /// Elements as floats; missing components keep the value of `fill`, so that a `VEC3` colour gets alpha 1.
+    /// Whether an accessor that exists holds floats.
+    pub fn is_float(&self, index: usize) -> bool {
+        self.component(index) == Some(Component::F32)
+    }
+
+    /// Whether an accessor that exists holds bytes as they are.
+    pub fn is_byte(&self, index: usize) -> bool {
+        self.component(index) == Some(Component::U8) && !self.root.accessors[index].normalized
+    }
+
+    /// Whether an accessor that exists holds integers that stand for [0, 1] or [−1, 1].
+    pub fn is_normalized(&self, index: usize) -> bool {
+        use Component::{I8, I16, U8, U16};
+        let component = self.component(index);
+        self.root.accessors[index].normalized && matches!(component, Some(I8 | U8 | I16 | U16))
+    }
+
+    fn component(&self, index: usize) -> Option<Component> {
+        Component::from_gl(self.root.accessors[index].component_type)
+    }
+
+    /// Number of vertices of an attribute.
+    pub fn bounded_count(&self, index: usize, user: &str) -> Result<usize, SceneError> {
+        self.count_within(index, user, limits::VERTEX_COUNT_MAX)
+    }
+
+    /// Whether there is anything behind the buffer.
+    pub fn has_bytes(&self, buffer: usize) -> bool {
+        self.buffers.get(buffer).is_some_and(|blob| blob.bytes().is_some())
+    }
+
+    /// What keeps an accessor from being read, whether or not something reads it.
+    pub fn check_accessor(&self, index: usize) -> Option<SceneError> {
+        const KINDS: [&str; 7] = ["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"];
+        let accessor = self.root.accessors.get(index)?;
+        let layout = match self.layout(index, accessor, &KINDS, u32::MAX as usize) {
+            Ok(layout) => layout,
+            Err(error) => return Some(error),
+        };
+        self.sparse(index, accessor.sparse.as_ref()?, &layout).err()
+    }
+
+    /// What keeps a buffer view from being read.
+    pub fn check_view(&self, index: usize) -> Option<SceneError> {
+        let buffer = self.buffers.get(self.root.buffer_views.get(index)?.buffer);
+        // One without data is a fault of the buffer, or of whoever reads it.
+        if buffer.is_some_and(|blob| blob.bytes().is_none()) {
+            return None;
+        }
+        self.span("", index, 0).err()
+    }
+
+    /// Hands each element to `sink` as floats, those that a sparse accessor replaces once more; missing
+    /// components keep the value of `fill`, so that a `VEC3` colour gets alpha 1.
+    pub fn each_float<const N: usize>(
+        &self,
+        index: usize,
+        user: &str,
+        kinds: &[&str],
+        fill: [f32; N],
+        sink: impl FnMut(usize, [f32; N]),
+    ) -> Result<(), SceneError> {
+        let accessor = self.accessor(index, user)?;
+        let layout = self.layout(index, accessor, kinds, limits::VERTEX_COUNT_MAX)?;
+        let (component, normalized) = (layout.component, accessor.normalized);
+        // Most are floats already; a loop of their own costs a quarter of the time.
+        if component == Component::F32 {
+            self.each(index, &layout, fill, |at| f32::from_le_bytes(first(at)), sink)
+        } else {
+            self.each(index, &layout, fill, |at| component.float(at, normalized), sink)
+        }
+    }
+
+    /// Elements as floats, see [`each_float`](Self::each_float).
     pub fn floats<const N: usize>(
         &self,
         index: usize,
@@ -172,11 +242,10 @@ impl<'a> Data<'a> {
         kinds: &[&str],
         fill: [f32; N],
     ) -> Result<Vec<[f32; N]>, SceneError> {
-        let accessor = self.accessor(index, user)?;
-        let normalized = accessor.normalized;
-        self.elements(index, kinds, limits::VERTEX_COUNT_MAX, fill, &|component, at| {
-            Ok(component.float(at, normalized))
-        })
+        let count = self.count_within(index, user, limits::VERTEX_COUNT_MAX)?;
+        let mut elements = vec![fill; count];
+        self.each_float(index, user, kinds, fill, |at, element| elements[at] = element)?;
+        Ok(elements)
     }
 
     /// Elements as unsigned integers.
@@ -186,46 +255,65 @@ impl<'a> Data<'a> {
         user: &str,
         kinds: &[&str],
     ) -> Result<Vec<[u32; N]>, SceneError> {
-        self.accessor(index, user)?;
-        self.elements(index, kinds, limits::INDEX_COUNT_MAX, [0; N], &|component, at| {
-            let reason = || SceneError::new(pointer(index), "componentType must be an unsigned integer");
-            component.unsigned(at).ok_or_else(reason)
-        })
+        let count = self.count_within(index, user, limits::INDEX_COUNT_MAX)?;
+        let layout = self.layout(index, &self.root.accessors[index], kinds, limits::INDEX_COUNT_MAX)?;
+        let component = layout.component;
+        if component.unsigned(&[0; 4]).is_none() {
+            return Err(SceneError::new(pointer(index), "componentType must be an unsigned integer"));
+        }
+        let mut elements = vec![[0; N]; count];
+        let sink = |at: usize, element| elements[at] = element;
+        if component == Component::U32 {
+            self.each(index, &layout, [0; N], |at| u32::from_le_bytes(first(at)), sink)?;
+        } else {
+            self.each(index, &layout, [0; N], |at| component.unsigned(at).unwrap_or(0), sink)?;
+        }
+        Ok(elements)
     }
 
-    fn elements<T: Copy + Default, const N: usize>(
+    /// Number of elements, refused before anything is allocated for them.
+    fn count_within(&self, index: usize, user: &str, limit: usize) -> Result<usize, SceneError> {
+        let count = self.accessor(index, user)?.count;
+        let bounded = usize::try_from(count).ok().filter(|&count| count <= limit);
+        let reason = || format!("{count} exceeds the limit of {limit}");
+        bounded.ok_or_else(|| SceneError::new(pointer(index) + "/count", reason()))
+    }
+
+    fn each<T: Copy + Default, const N: usize>(
         &self,
         index: usize,
-        kinds: &[&str],
-        limit: usize,
+        layout: &Layout<'_>,
         fill: [T; N],
-        read: ReadComponent<'_, T>,
-    ) -> Result<Vec<[T; N]>, SceneError> {
-        let accessor = &self.root.accessors[index];
-        let layout = self.layout(index, accessor, kinds, limit)?;
-        let mut elements = vec![fill; layout.count];
+        read: impl Fn(&[u8]) -> T,
+        mut sink: impl FnMut(usize, [T; N]),
+    ) -> Result<(), SceneError> {
         let width = layout.component.bytes();
         let used = layout.components.min(N);
-        let read_element = |element: &mut [T; N], bytes: &[u8]| -> Result<(), SceneError> {
+        let element = |bytes: &[u8]| {
+            let mut element = fill;
             for (value, at) in element[..used].iter_mut().zip(bytes.chunks_exact(width)) {
-                *value = read(layout.component, at)?;
+                *value = read(at);
             }
-            Ok(())
+            element
         };
         match layout.bytes {
             Some(bytes) => {
-                for (element, at) in elements.iter_mut().zip((0..).step_by(layout.stride)) {
-                    read_element(element, &bytes[at..])?;
+                for (at, start) in (0..layout.count).zip((0..).step_by(layout.stride)) {
+                    sink(at, element(&bytes[start..]));
                 }
             }
-            None => elements.iter_mut().for_each(|element| element[..used].fill(T::default())),
-        }
-        if let Some(sparse) = &accessor.sparse {
-            for (at, bytes) in self.sparse(index, sparse, &layout)? {
-                read_element(&mut elements[at], bytes)?;
+            None => {
+                let mut zero = fill;
+                zero[..used].fill(T::default());
+                (0..layout.count).for_each(|at| sink(at, zero));
             }
         }
-        Ok(elements)
+        if let Some(sparse) = &self.root.accessors[index].sparse {
+            for (at, bytes) in self.sparse(index, sparse, layout)? {
+                sink(at, element(bytes));
+            }
+        }
+        Ok(())
     }
 
     /// Which elements a sparse accessor replaces, and by which bytes.
@@ -292,18 +380,17 @@ impl<'a> Data<'a> {
             return fault("/componentType", format!("{} is no component type", accessor.component_type));
         };
         let components = component_count(&accessor.kind);
-        let (size, count) = (component.bytes() * components, accessor.count as usize);
+        let (size, count) = (element_bytes(&accessor.kind, component.bytes()), accessor.count as usize);
         let Some(view) = accessor.buffer_view else {
             return Ok(Layout { bytes: None, stride: size, count, components, component });
         };
         let (bytes, stride) = self.span(&pointer(index), view, accessor.byte_offset)?;
         let stride = stride.unwrap_or(size);
         if stride < size {
-            let view = format!("/bufferViews/{view}/byteStride");
-            return Err(SceneError::new(
-                view,
-                format!("{stride} is less than the {size} bytes of an element"),
-            ));
+            let reason = format!(
+                "the byteStride {stride} of buffer view {view} is less than the {size} bytes of an element"
+            );
+            return fault("", reason);
         }
         let needed = count.checked_sub(1).map_or(0, |last| last * stride + size);
         if needed > bytes.len() {
@@ -362,10 +449,22 @@ fn component_count(kind: &str) -> usize {
     match kind {
         "VEC2" => 2,
         "VEC3" => 3,
-        "VEC4" => 4,
+        "VEC4" | "MAT2" => 4,
+        "MAT3" => 9,
         "MAT4" => 16,
         _ => 1,
     }
+}
+
+/// Columns of matrices begin at multiples of 4 bytes (glTF 2.0, section 3.6.2.4).
+pub(crate) fn element_bytes(kind: &str, component_bytes: usize) -> usize {
+    let rows = match kind {
+        "MAT2" => 2,
+        "MAT3" => 3,
+        "MAT4" => 4,
+        _ => return component_bytes * component_count(kind),
+    };
+    (rows * component_bytes).next_multiple_of(4) * rows
 }
 
 fn pointer(index: usize) -> String {

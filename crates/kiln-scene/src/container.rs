@@ -7,20 +7,23 @@ const CHUNK_JSON: &[u8; 4] = b"JSON";
 const CHUNK_BIN: &[u8; 4] = b"BIN\0";
 const HEADER_BYTES: usize = 12;
 const CHUNK_HEADER_BYTES: usize = 8;
+const CHUNK_FAULT_COUNT_MAX: usize = 16;
 
 /// JSON text and binary payload of a file.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub(crate) struct Container<'a> {
     pub json: &'a [u8],
     pub bin: Option<&'a [u8]>,
     /// Whether it is a GLB; else the JSON is the file itself.
     pub binary: bool,
+    /// What is not as the format wants it and does no harm.
+    pub faults: Vec<SceneError>,
 }
 
 /// Splits a .glb, or takes a .gltf as it is.
 pub(crate) fn open(bytes: &[u8]) -> Result<Container<'_>, SceneError> {
     if !bytes.starts_with(MAGIC) {
-        return Ok(Container { json: bytes, bin: None, binary: false });
+        return Ok(Container { json: bytes, bin: None, binary: false, faults: Vec::new() });
     }
     let (version, length) = (u32_at(bytes, 4)?, u32_at(bytes, 8)? as usize);
     if version != 2 {
@@ -32,37 +35,65 @@ pub(crate) fn open(bytes: &[u8]) -> Result<Container<'_>, SceneError> {
     }
     let (json, mut at) = chunk(bytes, HEADER_BYTES, CHUNK_JSON)?
         .ok_or_else(|| fault(HEADER_BYTES, "the first chunk must be JSON".into()))?;
+    let mut faults = Vec::new();
+    if !at.is_multiple_of(4) {
+        faults.push(fault(HEADER_BYTES, "the JSON chunk does not end at a multiple of 4 bytes".into()));
+    }
     // Unknown chunks may stand between; a file without the binary chunk is complete.
+    let (mut bin, mut is_second) = (None, true);
     while at + CHUNK_HEADER_BYTES <= length {
-        if let Some((bin, _)) = chunk(bytes, at, CHUNK_BIN)? {
-            return Ok(Container { json, bin: Some(bin), binary: true });
+        let is_json = chunk(bytes, at, CHUNK_JSON)?.is_some();
+        match chunk(bytes, at, CHUNK_BIN)? {
+            Some((found, _)) if bin.is_none() => {
+                bin = Some(found);
+                if !is_second {
+                    faults.push(fault(at, "the binary chunk must be the second; it was read".into()));
+                }
+            }
+            found if found.is_some() || is_json => {
+                faults.push(fault(at, "a second chunk of this kind was ignored".into()));
+            }
+            _ => {}
         }
         at = chunk_end(bytes, at)?;
+        is_second = false;
+        // A file of nothing but tiny chunks must not cost a message for each.
+        if faults.len() >= CHUNK_FAULT_COUNT_MAX {
+            break;
+        }
     }
-    Ok(Container { json, bin: None, binary: true })
+    if at > length {
+        return Err(fault(8, format!("the header says {length} bytes, its chunks need {at}")));
+    }
+    Ok(Container { json, bin, binary: true, faults })
 }
 
 /// Joins JSON and payload into a GLB, both padded to four bytes as the format demands.
-pub(crate) fn join(json: &[u8], bin: &[u8]) -> Vec<u8> {
-    let padded = |length: usize| length.next_multiple_of(4);
-    let bin_bytes = if bin.is_empty() { 0 } else { CHUNK_HEADER_BYTES + padded(bin.len()) };
-    let total = HEADER_BYTES + CHUNK_HEADER_BYTES + padded(json.len()) + bin_bytes;
-    let mut out = Vec::with_capacity(total);
-    out.extend_from_slice(MAGIC);
-    out.extend_from_slice(&2u32.to_le_bytes());
-    out.extend_from_slice(&length_field(total).to_le_bytes());
-    push_chunk(&mut out, CHUNK_JSON, json, b' ');
+///
+/// The front goes into the payload's own buffer, as a second one would hold a large file twice.
+pub(crate) fn join(mut json: Vec<u8>, mut bin: Vec<u8>) -> Vec<u8> {
+    json.resize(json.len().next_multiple_of(4), b' ');
+    bin.resize(bin.len().next_multiple_of(4), 0);
+    let bin_bytes = if bin.is_empty() { 0 } else { CHUNK_HEADER_BYTES + bin.len() };
+    let total = HEADER_BYTES + CHUNK_HEADER_BYTES + json.len() + bin_bytes;
+    let mut front = Vec::with_capacity(total - bin.len());
+    front.extend_from_slice(MAGIC);
+    front.extend_from_slice(&2u32.to_le_bytes());
+    front.extend_from_slice(&length_field(total).to_le_bytes());
+    front.extend_from_slice(&chunk_header(CHUNK_JSON, json.len()));
+    front.extend_from_slice(&json);
     if !bin.is_empty() {
-        push_chunk(&mut out, CHUNK_BIN, bin, 0);
+        front.extend_from_slice(&chunk_header(CHUNK_BIN, bin.len()));
     }
-    out
+    bin.splice(0..0, front);
+    bin
 }
 
-fn push_chunk(out: &mut Vec<u8>, kind: &[u8; 4], data: &[u8], pad: u8) {
-    out.extend_from_slice(&length_field(data.len().next_multiple_of(4)).to_le_bytes());
-    out.extend_from_slice(kind);
-    out.extend_from_slice(data);
-    out.resize(out.len().next_multiple_of(4), pad);
+fn chunk_header(kind: &[u8; 4], length: usize) -> [u8; CHUNK_HEADER_BYTES] {
+    let mut header = [0; CHUNK_HEADER_BYTES];
+    header[..4].copy_from_slice(&length_field(length).to_le_bytes());
+    header[4..].copy_from_slice(kind);
+    header
 }
 
 /// The limits on vertices, indices and images keep a pack below the 4 GiB that the format can say.

@@ -3,6 +3,8 @@
 use serde::Deserialize;
 
 use crate::container::{self, Container};
+use crate::json::Json;
+use crate::locate::pointer_at;
 use crate::schema::Root;
 use crate::{SceneError, limits};
 
@@ -10,7 +12,11 @@ use crate::{SceneError, limits};
 #[derive(Debug)]
 pub(crate) struct Document<'a> {
     pub root: Root,
+    /// The same as it stands, for checks on what is not drawn.
+    pub json: Json<'a>,
     pub bin: Option<&'a [u8]>,
+    /// Faults of the container.
+    pub faults: Vec<SceneError>,
 }
 
 /// The JSON of a .gltf as text, for messages that show a line; `None` for a GLB or bytes that are not UTF-8.
@@ -24,7 +30,7 @@ pub(crate) fn text_of(bytes: &[u8]) -> Option<&str> {
 /// # Errors
 /// Broken containers, invalid JSON, wrong types, versions other than 2.x.
 pub(crate) fn parse(bytes: &[u8]) -> Result<Document<'_>, SceneError> {
-    let Container { json, bin, .. } = container::open(bytes)?;
+    let Container { json, bin, faults, .. } = container::open(bytes)?;
     if json.len() > limits::JSON_BYTES_MAX {
         let (actual, limit) = (json.len(), limits::JSON_BYTES_MAX);
         return Err(SceneError::new("", format!("{actual} bytes of JSON exceed the limit of {limit}")));
@@ -33,10 +39,30 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Document<'_>, SceneError> {
         SceneError::new("", format!("the JSON is not UTF-8: byte {}", error.valid_up_to()))
             .with_help("is this a glTF file?")
     })?;
+    check_value_count(json)?;
     check_version(text)?;
     let root = serde_json::from_str(text).map_err(|error| json_error(text, &error))?;
     check_numbers(text)?;
-    Ok(Document { root, bin })
+    let json = serde_json::from_str(text).map_err(|error| json_error(text, &error))?;
+    Ok(Document { root, json, bin, faults })
+}
+
+/// Every `{}` of two bytes becomes a table entry of hundreds, so their number is limited before they are made.
+fn check_value_count(json: &[u8]) -> Result<(), SceneError> {
+    let (mut objects, mut values) = (0, 0);
+    for byte in json {
+        objects += usize::from(*byte == b'{');
+        values += usize::from(matches!(byte, b'{' | b'[' | b','));
+    }
+    for (what, count, limit) in [
+        ("objects", objects, limits::JSON_OBJECT_COUNT_MAX),
+        ("values", values, limits::JSON_VALUE_COUNT_MAX),
+    ] {
+        if count > limit {
+            return Err(SceneError::new("", format!("{count} JSON {what} exceed the limit of {limit}")));
+        }
+    }
+    Ok(())
 }
 
 /// Refuses numbers that `f32` cannot hold: they would be infinite in the scene, and JSON has no infinity for
@@ -116,7 +142,8 @@ fn json_error(text: &str, error: &serde_json::Error) -> SceneError {
     let kind = if error.is_data() { "not as the glTF schema wants it" } else { "invalid JSON" };
     let place = format!("line {} column {}", error.line(), error.column());
     SceneError {
-        pointer: String::new(),
+        // In broken JSON the line and the column are the place.
+        pointer: if error.is_data() { pointer_at(text, at) } else { String::new() },
         reason: format!("{kind}: {reason} ({place})"),
         help: None,
         json_bytes: Some(at..at + 1),

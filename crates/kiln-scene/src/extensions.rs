@@ -3,10 +3,12 @@
 use crate::SceneError;
 use crate::schema::{Material, Root};
 
-/// Drawn, or harmless to a picture. Texture formats are absent although a fallback of theirs may be drawn:
-/// a file that requires them has none.
+/// Drawn, or harmless to a picture. Formats of textures that are absent may have a fallback that is drawn: a file
+/// that requires them has none.
 const SUPPORTED: &[&str] = &[
     "EXT_mesh_gpu_instancing",
+    "EXT_texture_webp",
+    "KHR_animation_pointer",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
@@ -37,8 +39,6 @@ const SUPPORTED: &[&str] = &[
 /// Noted by value where a drawn material has them, see [`material_notes`]; or where data is missing.
 const NOTED_ELSEWHERE: &[&str] = &[
     "EXT_meshopt_compression",
-    "EXT_texture_webp",
-    "KHR_animation_pointer",
     "KHR_draco_mesh_compression",
     "KHR_meshopt_compression",
     "KHR_texture_basisu",

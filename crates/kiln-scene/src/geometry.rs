@@ -20,6 +20,9 @@ pub(crate) const NEUTRAL: Vertex = Vertex {
     color: [1.0; 4],
 };
 
+/// Several times what rounding four weights leaves; the sum is scaled to 1 in any case.
+const WEIGHT_SUM_TOLERANCE: f64 = 1e-5;
+
 /// What the material reads; the rest is neither read nor stored.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Needs {
@@ -28,6 +31,17 @@ pub(crate) struct Needs {
     pub tangents: Option<crate::TextureRef>,
     /// UV sets of textures.
     pub uv: [bool; 2],
+}
+
+impl Needs {
+    /// What either of two materials reads. Tangents can follow one placement only: the first's.
+    pub fn or(self, other: Needs) -> Needs {
+        Needs {
+            normals: self.normals || other.normals,
+            tangents: self.tangents.or(other.tangents),
+            uv: [self.uv[0] || other.uv[0], self.uv[1] || other.uv[1]],
+        }
+    }
 }
 
 /// How the primitive is deformed before it is placed.
@@ -94,9 +108,9 @@ pub(crate) fn read(
         )
         .with_help("export the file without mesh compression"));
     }
-    let count = data.count(position, &format!("{pointer}/attributes/POSITION"))?;
-    budget.spend(count, pointer)?;
-    let mut reader = Reader { data, primitive, pointer, count: count as usize };
+    let count = data.bounded_count(position, &format!("{pointer}/attributes/POSITION"))?;
+    budget.spend(count as u64, pointer)?;
+    let mut reader = Reader { data, primitive, pointer, count };
     let indices = match triangulate(primitive.mode.unwrap_or(4), reader.indices()?) {
         Topology::Triangles(indices) if indices.is_empty() => {
             return Ok(Read::Nothing("it has no triangles".into()));
@@ -119,7 +133,7 @@ pub(crate) fn read(
 }
 
 fn draco_only<'a>(data: &Data<'_>, primitive: &'a Primitive, position: usize) -> Option<&'a str> {
-    let name = primitive.extensions.keys().find(|name| name.contains("draco"))?;
+    let name = primitive.extensions.others.keys().find(|name| name.contains("draco"))?;
     let accessor = data.root.accessors.get(position)?;
     accessor.buffer_view.is_none().then_some(name.as_str())
 }
@@ -134,11 +148,10 @@ struct Reader<'a, 'b> {
 impl Reader<'_, '_> {
     fn indices(&self) -> Result<Vec<u32>, SceneError> {
         let Some(index) = self.primitive.indices else {
-            return Ok((0..self.count.min(limits::VERTEX_COUNT_MAX) as u32).collect());
+            return Ok((0..self.count as u32).collect());
         };
         let user = format!("{}/indices", self.pointer);
-        let indices: Vec<u32> =
-            self.data.unsigned::<1>(index, &user, &["SCALAR"])?.into_iter().flatten().collect();
+        let indices: Vec<u32> = bytemuck::cast_vec(self.data.unsigned::<1>(index, &user, &["SCALAR"])?);
         match indices.iter().position(|&index| index as usize >= self.count) {
             None => Ok(indices),
             Some(at) => Err(SceneError::new(
@@ -172,34 +185,43 @@ impl Reader<'_, '_> {
 
     fn vertices(&mut self, needs: Needs, indices: Vec<u32>) -> Result<Geometry, SceneError> {
         let attributes = &self.primitive.attributes;
-        let get =
-            |name, kinds: &[&str]| self.attribute::<4>(attributes, "/attributes", name, kinds, [1.0; 4]);
-        let positions = get("POSITION", &["VEC3"])?.unwrap_or_default();
-        let mut vertices: Vec<Vertex> =
-            positions.iter().map(|&[x, y, z, _]| Vertex { position: [x, y, z], ..NEUTRAL }).collect();
-        let normals = if needs.normals { get("NORMAL", &["VEC3"])? } else { None };
+        let has = |name| attributes.contains_key(name);
+        let has_normals = needs.normals && has("NORMAL");
         // Without normals the specification has given tangents ignored too.
-        let tangents = match (&normals, needs.tangents) {
-            (Some(_), Some(_)) => get("TANGENT", &["VEC4"])?,
-            _ => None,
-        };
+        let has_tangents = has_normals && needs.tangents.is_some() && has("TANGENT");
         // Tangents that are not given are made along a set that no texture may read.
-        let placed = needs.tangents.filter(|_| tangents.is_none()).map(|placed| placed.uv_set as usize);
+        let placed = needs.tangents.filter(|_| !has_tangents).map(|placed| placed.uv_set as usize);
         let reads = |set: usize| needs.uv[set] || placed == Some(set);
-        let uv0 = if reads(0) { get("TEXCOORD_0", &["VEC2"])? } else { None };
-        let uv1 = if reads(1) { get("TEXCOORD_1", &["VEC2"])? } else { None };
-        let colors = get("COLOR_0", &["VEC3", "VEC4"])?;
-        for (at, vertex) in vertices.iter_mut().enumerate() {
-            if let Some(&[x, y, z, _]) = normals.as_ref().map(|normals| &normals[at]) {
-                vertex.normal = [x, y, z];
-            }
-            vertex.tangent = tangents.as_ref().map_or(vertex.tangent, |tangents| tangents[at]);
-            let uv =
-                |set: &Option<Vec<[f32; 4]>>| set.as_ref().map_or([0.0; 2], |set| [set[at][0], set[at][1]]);
-            (vertex.uv0, vertex.uv1) = (uv(&uv0), uv(&uv1));
-            vertex.color = colors.as_ref().map_or(vertex.color, |colors| colors[at]);
+        let mut vertices = vec![NEUTRAL; self.count];
+        self.column("POSITION", &["VEC3"], &mut vertices, |it, [x, y, z, _]| it.position = [x, y, z])?;
+        if has_normals {
+            self.column("NORMAL", &["VEC3"], &mut vertices, |it, [x, y, z, _]| it.normal = [x, y, z])?;
         }
-        Ok(Geometry { vertices, indices, has_normals: normals.is_some(), has_tangents: tangents.is_some() })
+        if has_tangents {
+            self.column("TANGENT", &["VEC4"], &mut vertices, |it, value| it.tangent = value)?;
+        }
+        if reads(0) {
+            self.column("TEXCOORD_0", &["VEC2"], &mut vertices, |it, [u, v, ..]| it.uv0 = [u, v])?;
+        }
+        if reads(1) {
+            self.column("TEXCOORD_1", &["VEC2"], &mut vertices, |it, [u, v, ..]| it.uv1 = [u, v])?;
+        }
+        self.column("COLOR_0", &["VEC3", "VEC4"], &mut vertices, |it, value| it.color = value)?;
+        Ok(Geometry { vertices, indices, has_normals, has_tangents, odd_weight_count: 0 })
+    }
+
+    /// Reads an attribute straight into the vertices, which takes no memory besides; an absent one is skipped.
+    fn column(
+        &self,
+        name: &str,
+        kinds: &[&str],
+        vertices: &mut [Vertex],
+        put: impl Fn(&mut Vertex, [f32; 4]),
+    ) -> Result<(), SceneError> {
+        let Some(&index) = self.primitive.attributes.get(name) else { return Ok(()) };
+        let user = format!("{}/attributes/{name}", self.pointer);
+        self.check_count(usize::try_from(self.data.count(index, &user)?).unwrap_or(usize::MAX), &user)?;
+        self.data.each_float(index, &user, kinds, [1.0; 4], |at, value| put(&mut vertices[at], value))
     }
 
     /// Adds the default weights' share of each morph target (glTF 2.0, section 3.7.2.2).
@@ -228,6 +250,9 @@ impl Reader<'_, '_> {
         let influences = self.influences(joints.len(), budget)?;
         for (vertex, influence) in geometry.vertices.iter_mut().zip(&influences) {
             let total: f64 = influence.iter().map(|&(_, weight)| weight).sum();
+            let is_odd =
+                (total - 1.0).abs() > WEIGHT_SUM_TOLERANCE || influence.iter().any(|(_, it)| *it < 0.0);
+            geometry.odd_weight_count += usize::from(is_odd);
             // A vertex that no joint holds stays where it was modelled.
             if !(total > 0.0 && total.is_finite()) {
                 continue;

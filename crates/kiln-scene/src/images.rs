@@ -1,4 +1,4 @@
-//! Decoding of PNG and JPEG, and what their texels say about effects.
+//! Decoding of PNG, JPEG and WebP, and what their texels say about effects.
 
 use std::io::Cursor;
 
@@ -28,7 +28,7 @@ pub(crate) struct ChannelRange {
 /// # Errors
 /// A sentence: unknown format, damaged data, too large.
 pub(crate) fn decode(bytes: &[u8], texels_left: usize) -> Result<Picture, String> {
-    let (format, mime_type) = sniff(bytes).ok_or("it is neither PNG nor JPEG")?;
+    let (format, mime_type) = sniff(bytes).ok_or("it is none of PNG, JPEG and WebP")?;
     let reader = || {
         let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
         let mut bounds = image::Limits::default();
@@ -46,11 +46,15 @@ pub(crate) fn decode(bytes: &[u8], texels_left: usize) -> Result<Picture, String
     }
     let decoded = reader().decode().map_err(|error| error.to_string())?.into_rgba8();
     let decoded = Image8 { width: decoded.width(), height: decoded.height(), rgba: decoded.into_raw() };
+    if format == ImageFormat::WebP {
+        // As PNG no reader of the pack needs an extension, and not a texel changes.
+        return from_texels(decoded);
+    }
     let range = channel_range(&decoded.rgba).ok_or("it has no texels")?;
     Ok(Picture { decoded, encoded: bytes.to_vec(), mime_type, range })
 }
 
-/// Decodes a PNG or JPEG file that is no part of a scene, within the limits of one.
+/// Decodes a PNG, JPEG or WebP file that is no part of a scene, within the limits of one.
 ///
 /// # Errors
 /// A sentence: unknown format, damaged data, too large.
@@ -77,6 +81,8 @@ fn sniff(bytes: &[u8]) -> Option<(ImageFormat, &'static str)> {
         Some((ImageFormat::Png, "image/png"))
     } else if bytes.starts_with(&[0xff, 0xd8, 0xff]) {
         Some((ImageFormat::Jpeg, "image/jpeg"))
+    } else if bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP") {
+        Some((ImageFormat::WebP, "image/webp"))
     } else {
         None
     }

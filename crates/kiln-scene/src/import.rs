@@ -6,14 +6,16 @@ use std::sync::Arc;
 use glam::{DMat3, DMat4, DVec3, Mat4};
 
 use crate::accessor::{Data, fetch_buffers};
+use crate::animate::{self, Motion, Renumbering, retarget};
 use crate::document::Document;
 use crate::geometry::{self, Budget, Deformation, Needs, Placing, Read};
+use crate::hierarchy::{Hierarchy, Place, carry, hierarchy, rounded};
 use crate::material_table::{MaterialTable, Settled};
 use crate::pose::{Pose, joint_matrices, pose};
 use crate::textures::TextureTable;
 use crate::write::GENERATOR;
-use crate::{Bounds, Draw, LightReads, Primitive, Scene, SceneError};
-use crate::{extensions, limits, rig, schema, shape};
+use crate::{Bounds, Camera, Draw, Item, Light, LightReads, Primitive, Scene, SceneError, VariantMaterial};
+use crate::{conform, extensions, limits, rig, schema, shape, variants};
 
 /// A scene, and the parts of the file that a pack needs besides.
 #[derive(Debug, Default)]
@@ -30,6 +32,8 @@ pub(crate) struct Imported {
     pub cameras: Vec<schema::Camera>,
     pub lights: Vec<(schema::Light, Mat4)>,
     pub warnings: Vec<SceneError>,
+    /// Where the file is not as glTF 2.0 wants it.
+    pub faults: Vec<SceneError>,
 }
 
 pub(crate) type Resolve<'a> = &'a mut dyn FnMut(&str) -> Option<Arc<[u8]>>;
@@ -47,23 +51,36 @@ pub(crate) fn import(
     extensions::check_required(root).map_err(|error| vec![error])?;
     let buffers = fetch_buffers(file, root, document.bin, resolve)?;
     let data = Data { root, buffers };
-    let pose = pose(root).map_err(|error| vec![error])?;
+    let motion = animate::read(&data);
+    let pose = pose(root, &motion.blinking()).map_err(|error| vec![error])?;
+    // A pack of this crate is as it should be, but for matrices that shear as its source does.
+    let is_pack = remembered_notes(root).is_some();
+    let mut faults = if is_pack { Vec::new() } else { conform::check(&document.json, &data) };
+    // What is left out because of a fault is said there, and once.
+    faults.retain(|fault| motion.warnings.iter().all(|warning| warning.pointer != fault.pointer));
     let textures = TextureTable::new(file, &data, resolve);
     let importer = Importer {
         data: &data,
         pose: &pose,
-        materials: MaterialTable::new(root, textures),
-        scene: Scene::default(),
+        hierarchy: hierarchy(root, &pose, &motion.nodes()),
+        materials: MaterialTable::new(root, textures, motion.material_ranges()),
+        motion,
+        scene: Scene { variants: variants::names(root), ..Scene::default() },
+        needs: Vec::new(),
         parts: BTreeMap::new(),
         mirrored: BTreeMap::new(),
         budget: Budget { steps_left: limits::POSE_STEP_COUNT_MAX },
         vertex_count: 0,
         index_count: 0,
         notes: Notes::default(),
+        draws: Vec::new(),
+        hidden: Vec::new(),
         cameras: Vec::new(),
         lights: Vec::new(),
     };
-    importer.run().map_err(|error| vec![error])
+    let mut imported = importer.run().map_err(|error| vec![error])?;
+    imported.faults = document.faults.iter().cloned().chain(faults).collect();
+    Ok(imported)
 }
 
 /// Notes in the order they came up, each once.
@@ -81,11 +98,22 @@ impl Notes {
     }
 }
 
+/// How a mesh stands in the scene.
+struct Standing {
+    place: Place,
+    name: String,
+    shown: bool,
+}
+
 struct Importer<'a, 'b> {
     data: &'a Data<'b>,
     pose: &'a Pose,
+    hierarchy: Hierarchy,
+    motion: Motion,
     materials: MaterialTable<'a, 'b>,
     scene: Scene,
+    /// What the materials of each of the scene's primitives read.
+    needs: Vec<Needs>,
     /// Scene primitive of a file's (mesh, primitive), where it looks the same wherever it stands.
     parts: BTreeMap<(usize, usize), Option<usize>>,
     /// Mirror image of a scene primitive.
@@ -94,8 +122,25 @@ struct Importer<'a, 'b> {
     vertex_count: usize,
     index_count: usize,
     notes: Notes,
-    cameras: Vec<schema::Camera>,
-    lights: Vec<(schema::Light, Mat4)>,
+    draws: Vec<(Place, Draw)>,
+    hidden: Vec<(Place, Draw)>,
+    cameras: Vec<(Place, FoundCamera)>,
+    lights: Vec<(Place, FoundLight)>,
+}
+
+/// A node's camera and the file's index of it.
+struct FoundCamera {
+    index: usize,
+    camera: Camera,
+    source: schema::Camera,
+}
+
+/// A node's light, the file's index of it, and where it stands.
+struct FoundLight {
+    index: usize,
+    light: Light,
+    source: schema::Light,
+    world: Mat4,
 }
 
 impl Importer<'_, '_> {
@@ -103,18 +148,38 @@ impl Importer<'_, '_> {
         let root = self.data.root;
         extensions::file_notes(root).into_iter().for_each(|note| self.notes.push(note));
         self.pose.note.iter().cloned().for_each(|note| self.notes.push(note));
+        self.motion.notes.drain(..).for_each(|note| self.notes.push(note));
         for &node in &self.pose.shown {
             self.add_node(node)?;
+        }
+        for &node in &self.pose.hidden {
+            self.add_shape(node, false)?;
         }
         if !self.lights.is_empty() {
             self.notes.push(format!("{} punctual lights are not drawn", self.lights.len()));
         }
+        let carried = &mut self.scene.carried;
+        self.scene.draws = carry(self.draws, Item::Draw, carried);
+        self.scene.hidden = carry(self.hidden, Item::Hidden, carried);
+        let cameras = carry(self.cameras, Item::Camera, carried);
+        let lights = carry(self.lights, Item::Light, carried);
+        self.scene.cameras = cameras.iter().map(|it| it.camera.clone()).collect();
+        self.scene.lights = lights.iter().map(|it| it.light.clone()).collect();
         order_primitives(&mut self.scene);
         self.scene.bounds = world_bounds(&self.scene);
-        let Settled { materials, flat, reads, textures, samplers, pictures, notes, warnings } =
+        let Settled { materials, flat, reads, textures, samplers, pictures, notes, mut warnings, moving } =
             self.materials.settle(&mut self.scene);
         notes.into_iter().for_each(|note| self.notes.push(note));
+        warnings.extend(self.motion.warnings);
         self.scene.materials = flat;
+        let renumbering = Renumbering {
+            nodes: &self.hierarchy.kept,
+            materials: &moving,
+            cameras: copies(cameras.iter().map(|it| it.index)),
+            lights: copies(lights.iter().map(|it| it.index)),
+        };
+        self.scene.animations = retarget(self.motion.animations, &|target| renumbering.apply(target));
+        self.scene.nodes = self.hierarchy.nodes;
         // A pack says what its source lacked; places in the pack itself mean nothing to the author.
         self.scene.notes = remembered_notes(root).unwrap_or(self.notes.list);
         Ok(Imported {
@@ -124,83 +189,80 @@ impl Importer<'_, '_> {
             textures,
             samplers,
             pictures,
-            cameras: self.cameras,
-            lights: self.lights,
+            cameras: cameras.into_iter().map(|it| it.source).collect(),
+            lights: lights.into_iter().map(|it| (it.source, it.world)).collect(),
             warnings,
+            faults: Vec::new(),
         })
     }
 
     fn add_node(&mut self, index: usize) -> Result<(), SceneError> {
+        let (root, node) = (self.data.root, &self.data.root.nodes[index]);
+        let place = self.hierarchy.place(self.pose, index);
+        if let Some(at) = node.camera {
+            let (camera, source) = rig::camera(root, index, at, place.world())?;
+            self.cameras.push((place, FoundCamera { index: at, camera, source }));
+        }
+        if let Some(at) = node.extensions.light {
+            let (light, source) = rig::light(root, index, at.light, place.world())?;
+            let world = place.world().as_mat4();
+            self.lights.push((place, FoundLight { index: at.light, light, source, world }));
+        }
+        self.add_shape(index, true)
+    }
+
+    /// Adds a node's mesh; `shown` unless the node is invisible at rest.
+    fn add_shape(&mut self, index: usize, shown: bool) -> Result<(), SceneError> {
         let node = &self.data.root.nodes[index];
-        let world = self.pose.worlds[index];
-        if let Some(camera) = node.camera {
-            let (camera, source) = rig::camera(self.data.root, index, camera, world)?;
-            self.scene.cameras.push(camera);
-            self.cameras.push(source);
-        }
-        if let Some(light) = node.extensions.light {
-            let (light, source) = rig::light(self.data.root, index, light.light, world)?;
-            self.scene.lights.push(light);
-            self.lights.push((source, world.as_mat4()));
-        }
         let Some(mesh) = node.mesh else { return Ok(()) };
+        let place = self.hierarchy.place(self.pose, index);
         let name = node.name.clone().unwrap_or_else(|| format!("node {index}"));
         match &node.extensions.instancing {
-            None => self.add_mesh(index, mesh, world, &name),
+            None => self.add_mesh(index, mesh, &Standing { place, name, shown }),
             Some(instancing) => {
                 for (at, local) in rig::instances(self.data, index, instancing)?.into_iter().enumerate() {
-                    self.add_mesh(index, mesh, world * local, &format!("{name} {at}"))?;
+                    let (place, name) = (place.then(local), format!("{name} {at}"));
+                    self.add_mesh(index, mesh, &Standing { place, name, shown })?;
                 }
                 Ok(())
             }
         }
     }
 
-    fn add_mesh(&mut self, node: usize, mesh: usize, world: DMat4, name: &str) -> Result<(), SceneError> {
+    fn add_mesh(&mut self, node: usize, mesh: usize, standing: &Standing) -> Result<(), SceneError> {
         let user = format!("/nodes/{node}/mesh");
         let count = self.data.root.meshes.len();
         let source = self.data.root.meshes.get(mesh);
         let source = source.ok_or_else(|| {
             SceneError::new(user, format!("mesh {mesh} does not exist, the file has {count}"))
         })?;
-        if !world.is_finite() {
-            self.notes.push(format!("node `{name}` is not drawn: its place is not finite"));
+        if !standing.place.world().is_finite() {
+            self.notes.push(format!("node `{}` is not drawn: its place is not finite", standing.name));
             return Ok(());
         }
         for at in 0..source.primitives.len() {
-            if self.scene.draws.len() >= limits::DRAW_COUNT_MAX {
+            if self.draws.len() + self.hidden.len() >= limits::DRAW_COUNT_MAX {
                 let limit = limits::DRAW_COUNT_MAX;
                 return Err(SceneError::new(format!("/nodes/{node}"), format!("more than {limit} draws")));
             }
-            self.add_draw(node, (mesh, at), world, name)?;
+            self.add_draw(node, (mesh, at), standing)?;
         }
         Ok(())
     }
 
-    fn add_draw(
-        &mut self,
-        node: usize,
-        part: (usize, usize),
-        world: DMat4,
-        name: &str,
-    ) -> Result<(), SceneError> {
+    fn add_draw(&mut self, node: usize, part: (usize, usize), standing: &Standing) -> Result<(), SceneError> {
         // Decided on what the draw will hold, so that a pack decides alike.
-        let world = world.as_mat4().as_dmat4();
+        let mut place = standing.place;
+        let world = rounded(place.world());
+        if place.node.is_none() {
+            place.local = world;
+        }
+        let shown = standing.shown && !(place.node.is_some() && vanishes(world));
         let skin = self.data.root.nodes[node].skin;
         let weights = self.data.root.nodes[node].weights.is_some();
-        let bake = skin.is_none() && is_singular(world);
+        let bake = skin.is_none() && shown && is_singular(world);
         if skin.is_some() || bake {
-            let joints = match skin {
-                Some(skin) => {
-                    joint_matrices(self.data, &self.pose.worlds, skin, &format!("/nodes/{node}/skin"))?
-                }
-                None => vec![world],
-            };
-            let deformation = if skin.is_some() { Placing::Skin(&joints) } else { Placing::Flattened(world) };
-            if let Some(primitive) = self.read_primitive(node, part, deformation)? {
-                self.scene.draws.push(Draw { primitive, world: Mat4::IDENTITY, name: name.to_owned() });
-            }
-            return Ok(());
+            return self.add_baked(node, part, skin, world, standing);
         }
         let shared = if weights { None } else { self.parts.get(&part).copied() };
         let primitive = match shared {
@@ -210,13 +272,39 @@ impl Importer<'_, '_> {
         if !weights {
             self.parts.insert(part, primitive);
         }
-        let Some(primitive) = primitive else { return Ok(()) };
-        let (primitive, world) = if world.determinant() < 0.0 {
-            (self.mirrored(primitive)?, world * DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0)))
-        } else {
-            (primitive, world)
+        let Some(mut primitive) = primitive else { return Ok(()) };
+        if world.determinant() < 0.0 {
+            primitive = self.mirrored(primitive)?;
+            place = place.then(DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0)));
+        }
+        let draw = Draw { primitive, world: place.world().as_mat4(), name: standing.name.clone() };
+        let list = if shown { &mut self.draws } else { &mut self.hidden };
+        list.push((place, draw));
+        Ok(())
+    }
+
+    /// A draw whose vertices are in world space: it stays where it is at rest.
+    fn add_baked(
+        &mut self,
+        node: usize,
+        part: (usize, usize),
+        skin: Option<usize>,
+        world: DMat4,
+        standing: &Standing,
+    ) -> Result<(), SceneError> {
+        if !standing.shown {
+            self.notes.push(format!("node `{}` is invisible at rest and is left out", standing.name));
+            return Ok(());
+        }
+        let joints = match skin {
+            Some(skin) => joint_matrices(self.data, &self.pose.worlds, skin, &format!("/nodes/{node}/skin"))?,
+            None => Vec::new(),
         };
-        self.scene.draws.push(Draw { primitive, world: world.as_mat4(), name: name.to_owned() });
+        let placing = if skin.is_some() { Placing::Skin(&joints) } else { Placing::Flattened(world) };
+        if let Some(primitive) = self.read_primitive(node, part, placing)? {
+            let draw = Draw { primitive, world: Mat4::IDENTITY, name: standing.name.clone() };
+            self.draws.push((Place::still(DMat4::IDENTITY), draw));
+        }
         Ok(())
     }
 
@@ -226,9 +314,14 @@ impl Importer<'_, '_> {
         }
         let source = &self.scene.primitives[primitive];
         let material = source.material;
-        let has_tangents = self.materials.needs(material).tangents.is_some();
-        let (vertices, indices) = shape::mirrored(&source.vertices, &source.indices, has_tangents);
-        let index = self.push_primitive(vertices, indices, material, "")?;
+        let needs = self.needs[primitive];
+        let (vertices, indices) =
+            shape::mirrored(&source.vertices, &source.indices, needs.tangents.is_some());
+        let index = self.push_primitive(vertices, indices, material, needs, "")?;
+        let variants = self.scene.variant_materials.iter().filter(|it| it.primitive == primitive);
+        let variants: Vec<_> =
+            variants.map(|it| VariantMaterial { primitive: index, ..it.clone() }).collect();
+        self.scene.variant_materials.extend(variants);
         self.mirrored.insert(primitive, index);
         Ok(index)
     }
@@ -243,7 +336,15 @@ impl Importer<'_, '_> {
         let primitive = &source.primitives[at];
         let pointer = format!("/meshes/{mesh}/primitives/{at}");
         let slot = self.materials.slot(primitive.material, &pointer)?;
-        let needs = self.materials.needs(slot);
+        let mut needs = self.materials.needs(slot);
+        let mut variant_materials = Vec::new();
+        let mappings = variants::mappings(primitive, self.scene.variants.len(), &pointer)?;
+        for (at, mapping) in mappings.iter().enumerate() {
+            let material = self.materials.slot(Some(mapping.material), &variants::place(&pointer, at))?;
+            needs = needs.or(self.materials.needs(material));
+            let variants = mapping.variants.clone();
+            variant_materials.push(VariantMaterial { primitive: 0, material, variants });
+        }
         let weights = self.data.root.nodes[node].weights.as_ref().unwrap_or(&source.weights);
         let deformation = Deformation { weights, placing };
         match geometry::read(self.data, primitive, &pointer, needs, deformation, &mut self.budget)? {
@@ -253,12 +354,18 @@ impl Importer<'_, '_> {
             }
             Read::Geometry(geometry) => {
                 self.note_missing_uvs(primitive, needs, &pointer);
+                self.note_restart(primitive, &geometry.indices, &pointer);
                 let (geometry, remarks) = shape::finish(geometry, needs);
-                remarks.into_iter().for_each(|remark| self.notes.push(format!("{pointer}: {remark}")));
+                remarks.into_iter().for_each(|remark| self.notes.push(format!("{pointer}{remark}")));
                 if geometry.indices.is_empty() {
                     return Ok(None);
                 }
-                self.push_primitive(geometry.vertices, geometry.indices, slot, &pointer).map(Some)
+                let (vertices, indices) = (geometry.vertices, geometry.indices);
+                let index = self.push_primitive(vertices, indices, slot, needs, &pointer)?;
+                let variants =
+                    variant_materials.into_iter().map(|it| VariantMaterial { primitive: index, ..it });
+                self.scene.variant_materials.extend(variants);
+                Ok(Some(index))
             }
         }
     }
@@ -272,11 +379,25 @@ impl Importer<'_, '_> {
         }
     }
 
+    /// The largest value of its type in an index means a new strip to a GPU, which glTF does not have.
+    fn note_restart(&mut self, primitive: &schema::Primitive, indices: &[u32], pointer: &str) {
+        let accessor = primitive.indices.and_then(|index| self.data.root.accessors.get(index));
+        let largest = match accessor.map(|accessor| accessor.component_type) {
+            Some(5121) => u32::from(u8::MAX),
+            Some(5123) => u32::from(u16::MAX),
+            _ => return,
+        };
+        if indices.contains(&largest) {
+            self.notes.push(format!("{pointer}/indices: {largest} is reserved; it was read as a vertex"));
+        }
+    }
+
     fn push_primitive(
         &mut self,
         vertices: Vec<crate::Vertex>,
         indices: Vec<u32>,
         material: usize,
+        needs: Needs,
         pointer: &str,
     ) -> Result<usize, SceneError> {
         self.vertex_count += vertices.len();
@@ -293,6 +414,7 @@ impl Importer<'_, '_> {
             }
         }
         let bounds = shape::bounds(&vertices);
+        self.needs.push(needs);
         self.scene.primitives.push(Primitive { vertices, indices, material, bounds });
         Ok(self.scene.primitives.len() - 1)
     }
@@ -303,6 +425,21 @@ fn remembered_notes(root: &schema::Root) -> Option<Vec<String>> {
     let extras = root.asset.extras.as_ref().filter(|_| root.asset.generator.as_deref() == Some(GENERATOR))?;
     let notes = extras.get("notes")?.as_array()?.iter().filter_map(|note| note.as_str());
     Some(notes.take(limits::NOTE_COUNT_MAX).map(str::to_owned).collect())
+}
+
+/// The scene's things by the file's that they are copies of.
+fn copies(indices: impl Iterator<Item = usize>) -> BTreeMap<usize, Vec<usize>> {
+    let mut copies: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    indices.enumerate().for_each(|(at, index)| copies.entry(index).or_default().push(at));
+    copies
+}
+
+/// Shrunk to a line or a point: there is nothing to draw, but an animation may well let it grow.
+fn vanishes(world: DMat4) -> bool {
+    let linear = DMat3::from_mat4(world);
+    let mut lengths = [linear.x_axis, linear.y_axis, linear.z_axis].map(DVec3::length);
+    lengths.sort_by(f64::total_cmp);
+    lengths[1] <= 1e-12 * lengths[2]
 }
 
 /// Flat as far as single precision can say, whatever the scale.
@@ -318,7 +455,7 @@ fn is_singular(world: DMat4) -> bool {
 /// Keeps the primitives that are drawn, in the order in which they are: one that was only ever mirrored goes.
 fn order_primitives(scene: &mut Scene) {
     let mut renumbered = BTreeMap::new();
-    for draw in &mut scene.draws {
+    for draw in scene.draws.iter_mut().chain(&mut scene.hidden) {
         let next = renumbered.len();
         draw.primitive = *renumbered.entry(draw.primitive).or_insert(next);
     }
@@ -329,6 +466,14 @@ fn order_primitives(scene: &mut Scene) {
         .collect();
     kept.sort_by_key(|(new, _)| *new);
     scene.primitives = kept.into_iter().map(|(_, primitive)| primitive).collect();
+    scene.variant_materials.retain_mut(|it| match renumbered.get(&it.primitive) {
+        Some(&primitive) => {
+            it.primitive = primitive;
+            true
+        }
+        None => false,
+    });
+    scene.variant_materials.sort_by_key(|it| it.primitive);
 }
 
 fn world_bounds(scene: &Scene) -> Option<Bounds> {

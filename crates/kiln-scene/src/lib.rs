@@ -14,29 +14,37 @@
 //!
 //! Not here: files (a caller resolves URIs), GPU resources (`kiln-preview`), which lobes to bake (`kiln-project`).
 
+pub use animation::{Animation, Channel, Curve, Interpolation, Target};
 pub use effect::variant_name;
 pub use error::SceneError;
 pub use images::decode_image;
 
 pub use pack::{LightReads, MaterialEffects, Packed, SceneSummary, load, pack};
+pub use property::{CameraProperty, LightProperty, MaterialProperty, TextureSlot};
 pub use scene::*;
 pub use uri::{Uri, UriKind, external_uris};
 
 mod accessor;
+mod animate;
+mod animation;
+mod conform;
 mod container;
 mod document;
 mod effect;
 mod error;
 mod extensions;
 mod geometry;
+mod hierarchy;
 mod images;
 mod import;
+mod json;
 pub mod limits;
 mod locate;
 mod material_table;
 mod materials;
 mod pack;
 mod pose;
+mod property;
 mod prune;
 mod rig;
 mod scene;
@@ -47,7 +55,9 @@ mod tangents;
 mod textures;
 mod topology;
 mod uri;
+mod variants;
 mod write;
+mod write_motion;
 
 #[cfg(test)]
 mod tests;

@@ -14,5 +14,15 @@ pub const IMAGE_EDGE_MAX: u32 = 16_384;
 pub const TEXEL_COUNT_MAX: usize = 1 << 28;
 /// Most bytes of JSON text.
 pub const JSON_BYTES_MAX: usize = 1 << 28;
+/// Most objects in the JSON text; sixteen for each of the most draws.
+pub const JSON_OBJECT_COUNT_MAX: usize = 1 << 20;
+/// Most materials, which are the largest entries of all tables (2 KB).
+pub const MATERIAL_COUNT_MAX: usize = 1 << 16;
+/// Most values in the JSON text, which has no vertices in it.
+pub const JSON_VALUE_COUNT_MAX: usize = 1 << 23;
 /// Most notes kept; a file with more repeats itself.
 pub const NOTE_COUNT_MAX: usize = 256;
+/// Most channels of all animations together.
+pub const CHANNEL_COUNT_MAX: usize = 1 << 16;
+/// Most times and values of all curves together (128 MB): channels may name one accessor many times.
+pub const CURVE_VALUE_COUNT_MAX: usize = 1 << 25;

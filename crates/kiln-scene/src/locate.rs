@@ -1,5 +1,6 @@
 //! Finds the text that a JSON pointer means, so that a message can show the line.
 
+use std::fmt;
 use std::ops::Range;
 
 /// Bytes of the value at `pointer` (RFC 6901, without `~` escapes) in valid JSON `text`; for an object or
@@ -21,6 +22,60 @@ pub(crate) fn locate(text: &str, pointer: &str) -> Option<Range<usize>> {
     }
     cursor.skip_value()?;
     Some(start..cursor.at)
+}
+
+/// JSON pointer of the innermost value around byte `at`, the inverse of [`locate`]; at a closing bracket the value
+/// that ends there. `text` may be broken from there on.
+pub(crate) fn pointer_at(text: &str, at: usize) -> String {
+    let mut cursor = Cursor { bytes: text.as_bytes().get(..=at).unwrap_or(text.as_bytes()), at: 0 };
+    let mut path: Vec<Step> = Vec::new();
+    while let Some(byte) = cursor.peek() {
+        match byte {
+            b'{' => path.push(Step::Member { key: String::new(), is_known: false }),
+            b'[' => path.push(Step::Element(0)),
+            b'}' | b']' => {
+                path.pop();
+                if cursor.at == at {
+                    break;
+                }
+            }
+            b',' => match path.last_mut() {
+                Some(Step::Element(index)) => *index += 1,
+                Some(Step::Member { is_known, .. }) => *is_known = false,
+                None => {}
+            },
+            b'"' => {
+                let start = cursor.at + 1;
+                let is_whole = cursor.skip_string().is_some();
+                if let Some(Step::Member { key, is_known: is_known @ false }) = path.last_mut()
+                    && is_whole
+                {
+                    text.get(start..cursor.at - 1).unwrap_or_default().clone_into(key);
+                    *is_known = true;
+                }
+                continue;
+            }
+            _ => {}
+        }
+        cursor.at += 1;
+    }
+    path.iter().map(Step::to_string).collect()
+}
+
+/// A step of a JSON pointer.
+enum Step {
+    Member { key: String, is_known: bool },
+    Element(usize),
+}
+
+impl fmt::Display for Step {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Step::Member { is_known: false, .. } => Ok(()),
+            Step::Member { key, .. } => write!(formatter, "/{}", key.replace('~', "~0").replace('/', "~1")),
+            Step::Element(index) => write!(formatter, "/{index}"),
+        }
+    }
 }
 
 struct Cursor<'a> {

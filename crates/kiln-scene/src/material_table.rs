@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::animate::Ranges;
 use crate::geometry::Needs;
 use crate::images::Picture;
 use crate::materials::{flatten, parse_alpha_mode, transform_rows, uv_set};
@@ -9,12 +10,15 @@ use crate::prune::{Pruned, prune, retain_textures, settle};
 use crate::schema::{self, TextureInfo};
 use crate::textures::{Found, TextureTable, sampler};
 use crate::{
-    ColorSpace, LightReads, Material, Scene, SceneError, Texture, TextureRef, extensions, specular_glossiness,
+    ColorSpace, LightReads, Material, MaterialProperty, Scene, SceneError, Texture, TextureRef, extensions,
+    specular_glossiness,
 };
 
 pub(crate) struct MaterialTable<'a, 'b> {
     root: &'a schema::Root,
     textures: TextureTable<'a, 'b>,
+    /// What animations do, by the file's material index.
+    ranges: BTreeMap<usize, Ranges>,
     /// Slot by the file's material index; the default material comes last.
     slots_by_index: BTreeMap<usize, usize>,
     slots: Vec<Slot>,
@@ -39,11 +43,17 @@ pub(crate) struct Settled {
     pub pictures: Vec<(&'static str, Vec<u8>)>,
     pub notes: Vec<String>,
     pub warnings: Vec<SceneError>,
+    /// The scene's material by the file's, and what it still has of the properties that are animated.
+    pub moving: BTreeMap<usize, (usize, Vec<MaterialProperty>)>,
 }
 
 impl<'a, 'b> MaterialTable<'a, 'b> {
-    pub fn new(root: &'a schema::Root, textures: TextureTable<'a, 'b>) -> Self {
-        MaterialTable { root, textures, slots_by_index: BTreeMap::new(), slots: Vec::new() }
+    pub fn new(
+        root: &'a schema::Root,
+        textures: TextureTable<'a, 'b>,
+        ranges: BTreeMap<usize, Ranges>,
+    ) -> Self {
+        MaterialTable { root, textures, ranges, slots_by_index: BTreeMap::new(), slots: Vec::new() }
     }
 
     /// Number of a material in this table; read and pruned on first use. `None` is glTF's default material.
@@ -56,7 +66,7 @@ impl<'a, 'b> MaterialTable<'a, 'b> {
             return Ok(slot);
         }
         let slot = match index {
-            None => self.prepare(schema::Material::default(), "default".into(), user),
+            None => self.prepare(schema::Material::default(), "default".into(), Ranges::new(), user),
             Some(index) => {
                 let count = self.root.materials.len();
                 let source = self.root.materials.get(index).ok_or_else(|| {
@@ -70,7 +80,8 @@ impl<'a, 'b> MaterialTable<'a, 'b> {
                     return Err(SceneError::new(place + "/alphaMode", "it is none of OPAQUE, MASK, BLEND"));
                 }
                 let name = source.name.clone().unwrap_or_else(|| format!("material {index}"));
-                self.prepare(source.clone(), name, &place)
+                let ranges = self.ranges.get(&index).cloned().unwrap_or_default();
+                self.prepare(source.clone(), name, ranges, &place)
             }
         };
         self.slots.push(slot);
@@ -83,7 +94,7 @@ impl<'a, 'b> MaterialTable<'a, 'b> {
         self.slots[slot].needs
     }
 
-    fn prepare(&mut self, mut material: schema::Material, name: String, place: &str) -> Slot {
+    fn prepare(&mut self, mut material: schema::Material, name: String, ranges: Ranges, place: &str) -> Slot {
         let mut notes = extensions::material_notes(&name, &material);
         let textures = &mut self.textures;
         let mut keep = |info: &mut TextureInfo, _: ColorSpace| {
@@ -107,7 +118,7 @@ impl<'a, 'b> MaterialTable<'a, 'b> {
             ));
         }
         material.name = Some(name.clone());
-        let pruned = prune(material, &|info| self.textures.range(info));
+        let pruned = prune(material, &ranges, &|info| self.textures.range(info));
         Slot { name, needs: needs(&pruned), pruned, notes }
     }
 
@@ -117,9 +128,14 @@ impl<'a, 'b> MaterialTable<'a, 'b> {
         let mut settled = Settled::default();
         let mut final_index = BTreeMap::new();
         let mut numbering = Numbering::default();
-        for &slot in self.slots_by_index.values() {
-            let users = scene.primitives.iter().filter(|primitive| primitive.material == slot);
-            let Some(colors) = users.map(colors).reduce(Colors::and) else { continue };
+        let each: Vec<Colors> = scene.primitives.iter().map(colors).collect();
+        let variants = scene.variant_materials.iter().map(|it| (it.primitive, it.material));
+        let users: Vec<(usize, usize)> =
+            scene.primitives.iter().map(|it| it.material).enumerate().chain(variants).collect();
+        for (&index, &slot) in &self.slots_by_index {
+            let used =
+                users.iter().filter(|(_, material)| *material == slot).map(|&(primitive, _)| each[primitive]);
+            let Some(colors) = used.reduce(Colors::and) else { continue };
             let Slot { name, pruned, notes, .. } = &mut self.slots[slot];
             settle(pruned, colors.any, colors.alpha_min, &|info| self.textures.range(info));
             settled.notes.append(notes);
@@ -136,9 +152,16 @@ impl<'a, 'b> MaterialTable<'a, 'b> {
             settled.materials.push(material);
             settled.reads.push(pruned.reads);
             final_index.insert(slot, settled.flat.len() - 1);
+            let mut moving: Vec<MaterialProperty> =
+                self.ranges.get(&index).into_iter().flatten().map(|(property, _)| *property).collect();
+            moving.retain(|property| pruned.responds_to(*property));
+            settled.moving.insert(index, (settled.flat.len() - 1, moving));
         }
         for primitive in &mut scene.primitives {
             primitive.material = final_index[&primitive.material];
+        }
+        for variant in &mut scene.variant_materials {
+            variant.material = final_index[&variant.material];
         }
         settled.warnings = std::mem::take(&mut self.textures.warnings);
         numbering.write(&mut self.textures.pictures, scene, &mut settled);

@@ -18,7 +18,8 @@ pub struct Packed {
     pub effects: Vec<MaterialEffects>,
     /// Counts and extent, for people and planners.
     pub summary: SceneSummary,
-    /// Errors if there is no GLB; else warnings and notes.
+    /// Errors if there is no GLB; else what is not drawn as asked for, then where the file is not as glTF 2.0
+    /// wants it.
     pub diagnostics: Vec<Diagnostic>,
 }
 
@@ -114,13 +115,15 @@ pub fn pack(file: &str, bytes: &[u8], resolve: &mut dyn FnMut(&str) -> Option<Ar
             return refuse(vec![SceneError::new("", format!("the pack cannot be written: {error}"))]);
         }
     };
-    let warnings = std::mem::take(&mut imported.warnings).into_iter();
+    let warn = |error| diagnose(Severity::Warning, error);
+    let warnings = std::mem::take(&mut imported.warnings).into_iter().map(warn);
+    let faults = std::mem::take(&mut imported.faults).into_iter().map(warn);
     let notes = imported.scene.notes.iter().map(|note| Diagnostic::note(note).in_file(file));
     Packed {
         glb: Some(glb),
         effects: effects(&imported),
         summary: summary(&imported.scene),
-        diagnostics: warnings.map(|error| diagnose(Severity::Warning, error)).chain(notes).collect(),
+        diagnostics: warnings.chain(notes).chain(faults).collect(),
     }
 }
 
@@ -135,8 +138,8 @@ pub fn load(glb: &[u8]) -> Result<Scene, SceneError> {
         let first = errors.into_iter().next();
         first.unwrap_or_else(|| SceneError::new("", "the file cannot be read"))
     })?;
-    let Imported { mut scene, warnings, .. } = imported;
-    scene.notes.extend(warnings.iter().map(ToString::to_string));
+    let Imported { mut scene, warnings, faults, .. } = imported;
+    scene.notes.extend(warnings.iter().chain(&faults).map(ToString::to_string));
     Ok(scene)
 }
 

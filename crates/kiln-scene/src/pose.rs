@@ -1,5 +1,7 @@
 //! Node hierarchy and skins at the rest pose (glTF 2.0, sections 3.5 and 3.7.3).
 
+use std::collections::BTreeSet;
+
 use glam::{DMat4, DQuat, DVec3, DVec4};
 
 use crate::SceneError;
@@ -13,33 +15,46 @@ pub(crate) struct Pose {
     pub worlds: Vec<DMat4>,
     /// Nodes of the scene, depth first; invisible ones (`KHR_node_visibility`) and what hangs on them are absent.
     pub shown: Vec<usize>,
+    /// Nodes that are invisible now, but that an animation may show.
+    pub hidden: Vec<usize>,
+    /// Every node, parents first.
+    pub order: Vec<usize>,
+    pub parents: Vec<Option<usize>>,
     /// What is worth saying about the choice of the scene.
     pub note: Option<String>,
 }
 
-/// Evaluates the hierarchy.
+/// Evaluates the hierarchy; an animation sets the visibility of the nodes in `blinking`.
 ///
 /// # Errors
 /// Indices out of range, a node with two parents, cycles, transforms that are not finite.
-pub(crate) fn pose(root: &Root) -> Result<Pose, SceneError> {
+pub(crate) fn pose(root: &Root, blinking: &BTreeSet<usize>) -> Result<Pose, SceneError> {
     let parents = parents(&root.nodes)?;
     let tops: Vec<usize> = (0..root.nodes.len()).filter(|&node| parents[node].is_none()).collect();
     let order = depth_first(&root.nodes, &tops, |_| true);
     if order.len() < root.nodes.len() {
-        let reached: std::collections::BTreeSet<_> = order.iter().collect();
+        let reached: BTreeSet<_> = order.iter().collect();
         let lost = (0..root.nodes.len()).find(|node| !reached.contains(node)).unwrap_or(0);
         return Err(SceneError::new(format!("/nodes/{lost}"), "the node is its own ancestor"));
     }
     let mut worlds = vec![DMat4::IDENTITY; root.nodes.len()];
-    for node in order {
-        let local = local_matrix(&root.nodes[node], node)?;
+    for &node in &order {
+        let local = local_matrix(&root.nodes[node]);
+        if !local.is_finite() {
+            return Err(SceneError::new(format!("/nodes/{node}"), "the transform is not finite"));
+        }
         // No product for a top node: a product with the identity may change the sign of a zero.
         worlds[node] = parents[node].map_or(local, |parent| worlds[parent] * local);
     }
-    let (listed, note) = listed_nodes(root, &tops)?;
+    let (listed, note) = listed_nodes(root, &tops, &parents)?;
     let visible = |node: usize| root.nodes[node].extensions.visibility.is_none_or(|it| it.visible);
     let shown = depth_first(&root.nodes, &listed, visible);
-    Ok(Pose { worlds, shown, note })
+    let may_show = |node: usize| visible(node) || blinking.contains(&node);
+    let mut hidden =
+        if blinking.is_empty() { Vec::new() } else { depth_first(&root.nodes, &listed, may_show) };
+    let seen: BTreeSet<_> = shown.iter().copied().collect();
+    hidden.retain(|node| !seen.contains(node));
+    Ok(Pose { worlds, shown, hidden, order, parents, note })
 }
 
 fn parents(nodes: &[Node]) -> Result<Vec<Option<usize>>, SceneError> {
@@ -73,7 +88,11 @@ fn depth_first(nodes: &[Node], tops: &[usize], enter: impl Fn(usize) -> bool) ->
     order
 }
 
-fn listed_nodes(root: &Root, tops: &[usize]) -> Result<(Vec<usize>, Option<String>), SceneError> {
+fn listed_nodes(
+    root: &Root,
+    tops: &[usize],
+    parents: &[Option<usize>],
+) -> Result<(Vec<usize>, Option<String>), SceneError> {
     let index = root.scene.unwrap_or(0);
     let Some(scene) = root.scenes.get(index) else {
         if root.scene.is_some() {
@@ -93,7 +112,7 @@ fn listed_nodes(root: &Root, tops: &[usize]) -> Result<(Vec<usize>, Option<Strin
         if std::mem::replace(slot, true) {
             return Err(SceneError::new(place(), format!("node {node} is listed twice")));
         }
-        if !tops.contains(&node) {
+        if parents[node].is_some() {
             return Err(SceneError::new(place(), format!("node {node} is the child of another node")));
         }
     }
@@ -102,19 +121,15 @@ fn listed_nodes(root: &Root, tops: &[usize]) -> Result<(Vec<usize>, Option<Strin
     Ok((scene.nodes.clone(), note))
 }
 
-fn local_matrix(node: &Node, index: usize) -> Result<DMat4, SceneError> {
-    let matrix = match &node.matrix {
+/// A node's place relative to its parent.
+pub(crate) fn local_matrix(node: &Node) -> DMat4 {
+    match &node.matrix {
         Some(columns) => DMat4::from_cols_array(&columns.map(f64::from)),
         None => {
             let translation = DVec3::from_array(node.translation.unwrap_or([0.0; 3]).map(f64::from));
             let scale = DVec3::from_array(node.scale.unwrap_or([1.0; 3]).map(f64::from));
             trs(translation, node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]), scale)
         }
-    };
-    if matrix.is_finite() {
-        Ok(matrix)
-    } else {
-        Err(SceneError::new(format!("/nodes/{index}"), "the transform is not finite"))
     }
 }
 

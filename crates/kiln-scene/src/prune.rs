@@ -1,11 +1,13 @@
 //! Which effects a material's values call for; what nothing calls for is taken out of it.
 //!
 //! Names decide nothing: a clear coat of factor 0, a black emissive texture or a flat normal map is no effect.
+//! Values that an animation changes count with all they become: each question is put to the end that can say yes.
 
+use crate::animate::Ranges;
 use crate::images::ChannelRange;
 use crate::materials::parse_alpha_mode;
-use crate::schema::{Clearcoat, Material, NormalTexture, OcclusionTexture, TextureInfo};
-use crate::{AlphaMode, ColorSpace, Effect, EffectSet, LightReads};
+use crate::schema::{Material, NormalTexture, OcclusionTexture, TextureInfo};
+use crate::{AlphaMode, ColorSpace, Effect, EffectSet, LightReads, MaterialProperty};
 
 /// Looks up the range of each channel of a texture.
 pub(crate) type Look<'a> = &'a dyn Fn(&TextureInfo) -> ChannelRange;
@@ -16,69 +18,126 @@ pub(crate) struct Pruned {
     pub material: Material,
     pub effects: EffectSet,
     pub reads: LightReads,
+    /// Least alpha of the base colour's factor.
+    alpha_min: f32,
+    /// Largest alpha that is cut.
+    cutoff_max: f32,
+}
+
+impl Pruned {
+    /// Whether setting `property` changes anything in what is left.
+    pub fn responds_to(&self, property: MaterialProperty) -> bool {
+        use MaterialProperty as M;
+        match property {
+            M::EmissiveFactor | M::EmissiveStrength if !self.effects.contains(&Effect::Emission) => false,
+            M::MetallicFactor | M::RoughnessFactor => !self.effects.contains(&Effect::Unlit),
+            M::AlphaCutoff => self.effects.contains(&Effect::AlphaMask),
+            property => property.values(&mut self.material.clone()).is_some(),
+        }
+    }
+}
+
+/// A material with every animated number at its smallest and at its largest.
+struct Extremes {
+    low: Material,
+    high: Material,
+}
+
+impl Extremes {
+    /// The rest pose counts too.
+    fn new(material: &Material, ranges: &Ranges) -> Self {
+        let (mut low, mut high) = (material.clone(), material.clone());
+        for (property, range) in ranges {
+            let ends = property.values(&mut low).into_iter().zip(property.values(&mut high));
+            for ((low, high), range) in ends.flat_map(|(low, high)| low.iter_mut().zip(high)).zip(range) {
+                *low = low.min(range[0]);
+                *high = high.max(range[1]);
+            }
+        }
+        clamp(&mut low);
+        clamp(&mut high);
+        Extremes { low, high }
+    }
+
+    fn any(&self, test: impl Fn(&Material) -> bool) -> bool {
+        test(&self.low) || test(&self.high)
+    }
 }
 
 /// Decides all effects but those that depend on vertex colours: see [`settle`].
-pub(crate) fn prune(mut material: Material, look: Look<'_>) -> Pruned {
+pub(crate) fn prune(mut material: Material, ranges: &Ranges, look: Look<'_>) -> Pruned {
     let mut effects = EffectSet::new();
+    clamp(&mut material);
+    let extremes = Extremes::new(&material, ranges);
+    let Extremes { low, high } = &extremes;
+    let alpha_min = low.pbr_metallic_roughness.base_color_factor[3];
+    let cutoff_max = high.alpha_cutoff.unwrap_or(0.5);
     if material.extensions.unlit.is_some() {
         effects.insert(Effect::Unlit);
-        return Pruned { material: unlit(material), effects, reads: LightReads::default() };
+        let reads = LightReads::default();
+        return Pruned { material: unlit(material), effects, reads, alpha_min, cutoff_max };
     }
-    clamp(&mut material);
     let mut keep = |effect, called_for: bool| {
         if called_for {
             effects.insert(effect);
         }
         called_for
     };
-    if !keep(Effect::Emission, emits(&material, look)) {
+    if !keep(Effect::Emission, emits(high, look)) {
         material.emissive_factor = [0.0; 3];
         material.emissive_texture = None;
         material.extensions.emissive_strength = None;
     }
-    if !keep(Effect::NormalMap, material.normal_texture.as_ref().is_some_and(|it| bends(it, look))) {
+    if !keep(
+        Effect::NormalMap,
+        extremes.any(|it| it.normal_texture.as_ref().is_some_and(|it| bends(it, look))),
+    ) {
         material.normal_texture = None;
     }
-    if !keep(Effect::Occlusion, material.occlusion_texture.as_ref().is_some_and(|it| occludes(it, look))) {
+    if !keep(Effect::Occlusion, high.occlusion_texture.as_ref().is_some_and(|it| occludes(it, look))) {
         material.occlusion_texture = None;
     }
-    if !keep(Effect::Clearcoat, prune_clearcoat(&mut material, look)) {
+    if !keep(Effect::Clearcoat, has_clearcoat(high, look)) {
         material.extensions.clearcoat = None;
     }
-    if !keep(Effect::Sheen, has_sheen(&material, look)) {
+    if let Some(clearcoat) = &mut material.extensions.clearcoat
+        && !extremes.any(|it| has_bent_clearcoat(it, look))
+    {
+        clearcoat.clearcoat_normal_texture = None;
+    }
+    if !keep(Effect::Sheen, has_sheen(high, look)) {
         material.extensions.sheen = None;
     }
-    let metal = is_metal(&material, look);
-    let transmits = !metal && transmits(&material, look);
+    let metal = is_metal(low, look);
+    let transmits = !metal && transmits(high, look);
     if !keep(Effect::Transmission, transmits) {
         material.extensions.transmission = None;
     }
-    let scatters = !metal && scatters(&material, look);
+    let scatters = !metal && scatters(high, look);
     if !keep(Effect::DiffuseTransmission, scatters) {
         material.extensions.diffuse_transmission = None;
     }
     // What lets no light in has no inside, and walls without an inside bend no light.
-    let has_inside = (transmits || scatters) && is_thick(&material, look);
+    let has_inside = (transmits || scatters) && is_thick(high, look);
     if !keep(Effect::Volume, has_inside) {
         material.extensions.volume = None;
     }
-    if !keep(Effect::Dispersion, transmits && has_inside && disperses(&material)) {
+    if !keep(Effect::Dispersion, transmits && has_inside && disperses(high)) {
         material.extensions.dispersion = None;
     }
-    if !keep(Effect::Anisotropy, is_brushed(&material, look)) {
+    if !keep(Effect::Anisotropy, is_brushed(high, look)) {
         material.extensions.anisotropy = None;
     }
-    if !keep(Effect::Iridescence, has_film(&material, look)) {
+    if !keep(Effect::Iridescence, has_film(high, look)) {
         material.extensions.iridescence = None;
     }
     // A metal reflects its base colour, so the dielectric layer's strength and colour do not show.
-    if !keep(Effect::Specular, !metal && has_specular(&material, look)) {
+    if !keep(Effect::Specular, !metal && extremes.any(|it| has_specular(it, look))) {
         material.extensions.specular = None;
         material.extensions.ior = None;
     }
-    let reads = reads(&material, look);
-    Pruned { material, effects, reads }
+    let reads = reads(&material, &extremes, look);
+    Pruned { material, effects, reads, alpha_min, cutoff_max }
 }
 
 /// Decides vertex colour and alpha once the geometry is known. `alpha_min` is the smallest vertex alpha.
@@ -88,9 +147,9 @@ pub(crate) fn settle(pruned: &mut Pruned, colored: bool, alpha_min: f32, look: L
     }
     let base = &pruned.material.pbr_metallic_roughness;
     let texture_min = base.base_color_texture.as_ref().map_or(1.0, |info| unit(look(info).min[3]));
-    let alpha = base.base_color_factor[3] * texture_min * alpha_min;
+    let alpha = pruned.alpha_min * texture_min * alpha_min;
     match parse_alpha_mode(&pruned.material) {
-        Some(AlphaMode::Mask { cutoff }) if alpha < cutoff => {
+        Some(AlphaMode::Mask { .. }) if alpha < pruned.cutoff_max => {
             pruned.effects.insert(Effect::AlphaMask);
         }
         Some(AlphaMode::Blend) if alpha < 1.0 => {
@@ -275,12 +334,15 @@ fn occludes(texture: &OcclusionTexture, look: Look<'_>) -> bool {
     texture.strength > 0.0 && look(&texture.info).min[0] < u8::MAX
 }
 
-fn prune_clearcoat(material: &mut Material, look: Look<'_>) -> bool {
-    let Some(clearcoat) = &mut material.extensions.clearcoat else { return false };
-    if clearcoat.clearcoat_normal_texture.as_ref().is_some_and(|texture| !bends(texture, look)) {
-        clearcoat.clearcoat_normal_texture = None;
-    }
-    clearcoat.clearcoat_factor * channel_max(clearcoat.clearcoat_texture.as_ref(), 0, look) > 0.0
+fn has_clearcoat(material: &Material, look: Look<'_>) -> bool {
+    let clearcoat = material.extensions.clearcoat.as_ref();
+    clearcoat
+        .is_some_and(|it| it.clearcoat_factor * channel_max(it.clearcoat_texture.as_ref(), 0, look) > 0.0)
+}
+
+fn has_bent_clearcoat(material: &Material, look: Look<'_>) -> bool {
+    let clearcoat = material.extensions.clearcoat.as_ref();
+    clearcoat.and_then(|it| it.clearcoat_normal_texture.as_ref()).is_some_and(|it| bends(it, look))
 }
 
 fn has_sheen(material: &Material, look: Look<'_>) -> bool {
@@ -352,41 +414,39 @@ fn has_specular(material: &Material, look: Look<'_>) -> bool {
 }
 
 /// What a lit material that was pruned reads of its environment.
-fn reads(material: &Material, look: Look<'_>) -> LightReads {
-    let extensions = &material.extensions;
-    let base = &material.pbr_metallic_roughness;
-    let mut ggx = interval(base.roughness_factor, base.metallic_roughness_texture.as_ref(), look);
-    if extensions.transmission.is_some() {
-        ggx[0] *= share_refracted(material);
+fn reads(pruned: &Material, Extremes { low, high }: &Extremes, look: Look<'_>) -> LightReads {
+    let rough = |it: &Material| it.pbr_metallic_roughness.roughness_factor;
+    let texture = pruned.pbr_metallic_roughness.metallic_roughness_texture.as_ref();
+    let mut ggx = interval([rough(low), rough(high)], texture, 1, look);
+    if pruned.extensions.transmission.is_some() {
+        ggx[0] *= share_refracted(pruned, low, high);
     }
-    if let Some(Clearcoat {
-        clearcoat_roughness_factor: factor, clearcoat_roughness_texture: texture, ..
-    }) = &extensions.clearcoat
-    {
-        let coat = interval(*factor, texture.as_ref(), look);
+    if let Some(coat) = &pruned.extensions.clearcoat {
+        let rough =
+            |it: &Material| it.extensions.clearcoat.as_ref().map_or(0.0, |it| it.clearcoat_roughness_factor);
+        let coat = interval([rough(low), rough(high)], coat.clearcoat_roughness_texture.as_ref(), 1, look);
         ggx = [ggx[0].min(coat[0]), ggx[1].max(coat[1])];
     }
-    let charlie = extensions.sheen.as_ref().map(|sheen| {
-        let (low, high) = sheen
-            .sheen_roughness_texture
-            .as_ref()
-            .map_or((1.0, 1.0), |info| (unit(look(info).min[3]), unit(look(info).max[3])));
-        [sheen.sheen_roughness_factor * low, sheen.sheen_roughness_factor * high]
+    let charlie = pruned.extensions.sheen.as_ref().map(|sheen| {
+        let rough = |it: &Material| it.extensions.sheen.as_ref().map_or(0.0, |it| it.sheen_roughness_factor);
+        interval([rough(low), rough(high)], sheen.sheen_roughness_texture.as_ref(), 3, look)
     });
     LightReads { ggx: Some(ggx), charlie }
 }
 
 /// Least share of its roughness that a refracted lobe keeps, over the colours that dispersion parts: none in a medium like
 /// air, all of it at index 1.5 and above (Khronos sample viewer, `applyIorToRoughness`; KHR_materials_dispersion).
-fn share_refracted(material: &Material) -> f32 {
-    let ior = material.extensions.ior.as_ref().map_or(1.5, |it| it.ior).max(1.0);
-    let dispersion = material.extensions.dispersion.map_or(0.0, |it| it.dispersion);
+fn share_refracted(pruned: &Material, low: &Material, high: &Material) -> f32 {
+    let ior = low.extensions.ior.as_ref().map_or(1.5, |it| it.ior).max(1.0);
+    let dispersion =
+        pruned.extensions.dispersion.and(high.extensions.dispersion).map_or(0.0, |it| it.dispersion);
     let least = ior - (ior - 1.0) * 0.025 * dispersion;
     (2.0 * least - 2.0).clamp(0.0, 1.0)
 }
 
-/// Roughness is in the green channel of both textures.
-fn interval(factor: f32, texture: Option<&TextureInfo>, look: Look<'_>) -> [f32; 2] {
-    let (low, high) = texture.map_or((1.0, 1.0), |info| (unit(look(info).min[1]), unit(look(info).max[1])));
-    [factor * low, factor * high]
+/// Factors times what a channel of a texture holds.
+fn interval(factor: [f32; 2], texture: Option<&TextureInfo>, channel: usize, look: Look<'_>) -> [f32; 2] {
+    let (low, high) =
+        texture.map_or((1.0, 1.0), |info| (unit(look(info).min[channel]), unit(look(info).max[channel])));
+    [factor[0] * low, factor[1] * high]
 }

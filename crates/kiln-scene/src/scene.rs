@@ -5,6 +5,8 @@ use std::collections::BTreeSet;
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec3};
 
+use crate::Animation;
+
 /// Everything a renderer needs to draw one scene.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
@@ -22,6 +24,18 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// Punctual lights of the file.
     pub lights: Vec<Light>,
+    /// What animations move, parents first; empty where nothing moves.
+    pub nodes: Vec<Node>,
+    /// What hangs on those nodes. A draw, camera or light that is not here never moves.
+    pub carried: Vec<Carried>,
+    /// What the rest pose does not show but an animation may: of invisible nodes and of nodes shrunk to a point or line.
+    pub hidden: Vec<Draw>,
+    /// What moves, and how; the draws above stand at the rest pose.
+    pub animations: Vec<Animation>,
+    /// Names of `KHR_materials_variants`; [`Primitive::material`] is the default, of none of them.
+    pub variants: Vec<String>,
+    /// Materials of primitives in variants.
+    pub variant_materials: Vec<VariantMaterial>,
     /// World bounds of all draws; `None` for an empty scene.
     pub bounds: Option<Bounds>,
     /// What the file asks for and this version draws approximately or not at all, a line each.
@@ -77,6 +91,70 @@ pub struct Draw {
     pub world: Mat4,
     /// The node's name, for messages.
     pub name: String,
+}
+
+/// A node that moves, or that another one which moves hangs on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Node {
+    /// Its name.
+    pub name: String,
+    /// Index of the node that it hangs on, which comes before it.
+    pub parent: Option<usize>,
+    /// Its place at rest, relative to its parent.
+    pub transform: Transform,
+    /// Whether it and what hangs on it are drawn at rest.
+    pub visible: bool,
+}
+
+/// A place relative to a parent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Transform {
+    /// Scaled, then rotated, then moved; what channels set one by one.
+    Parts {
+        /// Metres.
+        translation: [f32; 3],
+        /// Quaternion x, y, z, w.
+        rotation: [f32; 4],
+        /// Factors.
+        scale: [f32; 3],
+    },
+    /// No channel sets any of it.
+    Matrix(Mat4),
+}
+
+/// Something that moves with a node: its world matrix is the node's times `local`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Carried {
+    /// Index into [`Scene::nodes`].
+    pub node: usize,
+    /// What hangs there.
+    pub item: Item,
+    /// Item to node.
+    pub local: Mat4,
+}
+
+/// What a node may carry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Item {
+    /// Index into [`Scene::draws`].
+    Draw(usize),
+    /// Index into [`Scene::hidden`].
+    Hidden(usize),
+    /// Index into [`Scene::cameras`].
+    Camera(usize),
+    /// Index into [`Scene::lights`].
+    Light(usize),
+}
+
+/// The material that a primitive has in some variants.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct VariantMaterial {
+    /// Index into [`Scene::primitives`].
+    pub primitive: usize,
+    /// Index into [`Scene::materials`].
+    pub material: usize,
+    /// Indices into [`Scene::variants`].
+    pub variants: Vec<usize>,
 }
 
 /// One shading phenomenon a material calls for. [`Effect::name`] is the feature the shader is compiled with.

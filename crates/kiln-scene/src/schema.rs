@@ -4,11 +4,18 @@
 //! Defaults are the specification's; a property at its default is not written.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
+use serde::de::{Deserializer, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize};
 
+use crate::limits;
+
+pub(crate) use crate::schema::animation::*;
 pub(crate) use crate::schema::material::*;
 
+#[path = "schema_animation.rs"]
+mod animation;
 #[path = "schema_material.rs"]
 mod material;
 
@@ -30,10 +37,9 @@ pub(crate) struct Root {
     pub meshes: Vec<Mesh>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub skins: Vec<Skin>,
-    /// Only their number matters: the rest pose is drawn.
-    #[serde(default, skip_serializing)]
-    pub animations: Vec<serde::de::IgnoredAny>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub animations: Vec<Animation>,
+    #[serde(default, deserialize_with = "few_materials", skip_serializing_if = "Vec::is_empty")]
     pub materials: Vec<Material>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub textures: Vec<Texture>,
@@ -67,6 +73,8 @@ pub(crate) struct Asset {
 pub(crate) struct RootExtensions {
     #[serde(rename = "KHR_lights_punctual", default, skip_serializing_if = "Option::is_none")]
     pub lights: Option<Lights>,
+    #[serde(rename = "KHR_materials_variants", default, skip_serializing_if = "Option::is_none")]
+    pub variants: Option<Variants>,
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
@@ -134,7 +142,7 @@ pub(crate) struct Node {
 pub(crate) struct NodeExtensions {
     #[serde(rename = "KHR_lights_punctual", default, skip_serializing_if = "Option::is_none")]
     pub light: Option<LightIndex>,
-    #[serde(rename = "KHR_node_visibility", default, skip_serializing)]
+    #[serde(rename = "KHR_node_visibility", default, skip_serializing_if = "Option::is_none")]
     pub visibility: Option<Visibility>,
     #[serde(rename = "EXT_mesh_gpu_instancing", default, skip_serializing)]
     pub instancing: Option<Instancing>,
@@ -174,8 +182,8 @@ pub(crate) struct Primitive {
     pub mode: Option<u32>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub targets: Vec<BTreeMap<String, usize>>,
-    #[serde(default, skip_serializing)]
-    pub extensions: BTreeMap<String, serde::de::IgnoredAny>,
+    #[serde(default, skip_serializing_if = "has_no_variants")]
+    pub extensions: PrimitiveExtensions,
 }
 
 #[derive(Clone, Debug, Deserialize, Serialize)]
@@ -193,7 +201,7 @@ pub(crate) struct Texture {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<usize>,
     #[serde(default, skip_serializing)]
-    pub extensions: BTreeMap<String, serde::de::IgnoredAny>,
+    pub extensions: TextureExtensions,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
@@ -319,8 +327,36 @@ pub(crate) struct Buffer {
     pub byte_length: u64,
 }
 
+/// Stops at the limit, before memory for more is taken.
+fn few_materials<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Material>, D::Error> {
+    struct Few;
+    impl<'de> Visitor<'de> for Few {
+        type Value = Vec<Material>;
+
+        fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+            write!(formatter, "at most {} materials", limits::MATERIAL_COUNT_MAX)
+        }
+
+        fn visit_seq<A: SeqAccess<'de>>(self, mut sequence: A) -> Result<Vec<Material>, A::Error> {
+            let mut materials = Vec::new();
+            while let Some(material) = sequence.next_element()? {
+                if materials.len() >= limits::MATERIAL_COUNT_MAX {
+                    return Err(serde::de::Error::invalid_length(materials.len() + 1, &self));
+                }
+                materials.push(material);
+            }
+            Ok(materials)
+        }
+    }
+    deserializer.deserialize_seq(Few)
+}
+
 pub(crate) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
+}
+
+fn has_no_variants(extensions: &PrimitiveExtensions) -> bool {
+    extensions.variants.is_none()
 }
 
 pub(crate) fn one() -> f32 {

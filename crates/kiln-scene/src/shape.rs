@@ -16,21 +16,38 @@ pub(crate) struct Geometry {
     pub indices: Vec<u32>,
     pub has_normals: bool,
     pub has_tangents: bool,
+    /// Vertices whose joint weights are negative or do not sum up to 1.
+    pub odd_weight_count: usize,
 }
 
 /// How far from 1 the squared length of a unit vector may be; four times what rounding to f32 leaves.
 const UNIT_TOLERANCE: f64 = 1e-6;
 
-/// Repairs `geometry` and adds what is missing; returns sentences about what was wrong.
+/// Squared lengths this far from 1 are worth a word; rounding to 8 bits leaves a third of it.
+const NOTED_SQUARED_LENGTH_ERROR: f64 = 1.35e-2;
+
+/// Repairs `geometry` and adds what is missing; returns sentences about what was wrong, each after its
+/// place below the primitive.
 pub(crate) fn finish(mut geometry: Geometry, needs: Needs) -> (Geometry, Vec<String>) {
     let mut remarks = Vec::new();
-    let mut remark = |count: usize, what: &str| {
+    let mut remark = |count: usize, place: &str, what: &str| {
         if count > 0 {
-            remarks.push(format!("{count} {what}"));
+            remarks.push(format!("{place}: {count} {what}"));
         }
     };
-    remark(drop_non_finite_triangles(&mut geometry), "triangles with non-finite positions were dropped");
-    remark(repair_attributes(&mut geometry), "vertices had non-finite texture coordinates or colours");
+    remark(
+        geometry.odd_weight_count,
+        "/attributes/WEIGHTS_0",
+        "vertices have joint weights that are negative or whose sum is not 1",
+    );
+    remark(
+        drop_non_finite_triangles(&mut geometry),
+        "/attributes/POSITION",
+        "triangles with non-finite positions were dropped",
+    );
+    let (broken, outside) = repair_attributes(&mut geometry);
+    remark(broken, "", "vertices had non-finite texture coordinates or colours");
+    remark(outside, "/attributes/COLOR_0", "vertices have colours outside 0 to 1; negative ones count as 0");
     let had_indices = geometry.vertices.len() < geometry.indices.len();
     let mut split = false;
     if needs.normals && !geometry.has_normals {
@@ -38,8 +55,16 @@ pub(crate) fn finish(mut geometry: Geometry, needs: Needs) -> (Geometry, Vec<Str
         flat_normals(&mut geometry);
         split = true;
     } else if needs.normals {
+        let normal = "/attributes/NORMAL";
+        let lengths = geometry.vertices.iter().map(|vertex| vertex.normal);
+        remark(
+            lengths.filter(|&it| is_scaled(it)).count(),
+            normal,
+            "normals did not have length 1 and were scaled",
+        );
         remark(
             repair_normals(&mut geometry),
+            normal,
             "vertices without a usable normal got one from their triangles",
         );
     }
@@ -49,8 +74,17 @@ pub(crate) fn finish(mut geometry: Geometry, needs: Needs) -> (Geometry, Vec<Str
             tangents::generate(&mut geometry, placement);
             forget_uvs(&mut geometry, needs.uv);
             split = true;
+        } else {
+            let tangents = geometry.vertices.iter().map(|vertex| vertex.tangent);
+            let wrong = |&[x, y, z, w]: &[f32; 4]| is_scaled([x, y, z]) || w.abs() != 1.0;
+            let count = tangents.filter(wrong).count();
+            remark(
+                count,
+                "/attributes/TANGENT",
+                "tangents did not have length 1 or a handedness of ±1 and were made so",
+            );
         }
-        remark(repair_tangents(&mut geometry), "vertices without a usable tangent got an arbitrary one");
+        remark(repair_tangents(&mut geometry), "", "vertices without a usable tangent got an arbitrary one");
     }
     if split && had_indices {
         weld(&mut geometry);
@@ -117,10 +151,19 @@ fn unit(vector: [f32; 3]) -> Option<[f32; 3]> {
         .then(|| narrow(wide(vector) / length_squared.sqrt()))
 }
 
+/// Whether a vector has a direction, and a length that quantisation does not explain.
+fn is_scaled(vector: [f32; 3]) -> bool {
+    let length_squared = wide(vector).length_squared();
+    length_squared > 1e-24 && (length_squared - 1.0).abs() > NOTED_SQUARED_LENGTH_ERROR
+}
+
 fn drop_non_finite_triangles(geometry: &mut Geometry) -> usize {
+    let is_finite = |vertex: &Vertex| vertex.position.iter().all(|value| value.is_finite());
+    if geometry.vertices.iter().all(is_finite) {
+        return 0;
+    }
     let (triangles, _) = geometry.indices.as_chunks::<3>();
-    let finite =
-        |index: u32| geometry.vertices[index as usize].position.iter().all(|value| value.is_finite());
+    let finite = |index: u32| is_finite(&geometry.vertices[index as usize]);
     let kept: Vec<u32> =
         triangles.iter().filter(|t| t.iter().all(|&i| finite(i))).flatten().copied().collect();
     let dropped = triangles.len() - kept.len() / 3;
@@ -128,18 +171,20 @@ fn drop_non_finite_triangles(geometry: &mut Geometry) -> usize {
     dropped
 }
 
-fn repair_attributes(geometry: &mut Geometry) -> usize {
-    let mut repaired = 0;
+/// Number of vertices with values that are no numbers, and with colours out of range.
+fn repair_attributes(geometry: &mut Geometry) -> (usize, usize) {
+    let (mut repaired, mut outside) = (0, 0);
     for vertex in &mut geometry.vertices {
         let uv = vertex.uv0.iter_mut().chain(&mut vertex.uv1).map(|value| (value, 0.0));
         let values = uv.chain(vertex.color.iter_mut().map(|value| (value, 1.0)));
         let wrong = values.filter(|(value, _)| !value.is_finite());
         let count = wrong.map(|(value, neutral)| *value = neutral).count();
         repaired += usize::from(count > 0);
+        outside += usize::from(vertex.color.iter().any(|value| !(0.0..=1.0).contains(value)));
         // Colours multiply radiance: a negative one would take light away.
         vertex.color = vertex.color.map(|value| value.max(0.0));
     }
-    repaired
+    (repaired, outside)
 }
 
 /// Gives every corner a vertex of its own.
@@ -169,19 +214,22 @@ fn unit_or_up(vector: DVec3) -> [f32; 3] {
 }
 
 fn repair_normals(geometry: &mut Geometry) -> usize {
-    let units: Vec<_> = geometry.vertices.iter().map(|vertex| unit(vertex.normal)).collect();
-    let used = used_vertices(geometry);
-    let broken = units.iter().zip(&used).filter(|(unit, used)| unit.is_none() && **used).count();
-    let mut sums = vec![DVec3::ZERO; if broken > 0 { units.len() } else { 0 }];
-    if broken > 0 {
+    let is_broken = |vertex: &Vertex| unit(vertex.normal).is_none();
+    let (mut broken, mut sums) = (0, Vec::new());
+    if geometry.vertices.iter().any(is_broken) {
+        let used = used_vertices(geometry);
+        broken =
+            geometry.vertices.iter().zip(&used).filter(|(vertex, used)| **used && is_broken(vertex)).count();
+        sums = vec![DVec3::ZERO; geometry.vertices.len()];
         let (triangles, _) = geometry.indices.as_chunks::<3>();
         for triangle in triangles {
             let area = area_vector(&geometry.vertices, triangle);
             triangle.iter().for_each(|&index| sums[index as usize] += area);
         }
     }
-    for (at, (vertex, unit)) in geometry.vertices.iter_mut().zip(units).enumerate() {
-        vertex.normal = unit.unwrap_or_else(|| unit_or_up(sums.get(at).copied().unwrap_or(DVec3::ZERO)));
+    for (at, vertex) in geometry.vertices.iter_mut().enumerate() {
+        let from_triangles = || unit_or_up(sums.get(at).copied().unwrap_or(DVec3::ZERO));
+        vertex.normal = unit(vertex.normal).unwrap_or_else(from_triangles);
     }
     broken
 }
@@ -226,6 +274,9 @@ fn used_vertices(geometry: &Geometry) -> Vec<bool> {
 /// Removes vertices that no triangle uses and keeps the order of the others.
 fn compact(geometry: &mut Geometry) {
     let used = used_vertices(geometry);
+    if used.iter().all(|used| *used) {
+        return;
+    }
     let mut next = 0;
     let renumbered: Vec<u32> = used
         .iter()

@@ -1,12 +1,16 @@
 //! Tests of the whole way: bytes in, scene and pack out.
 
+mod animation;
 mod build;
+mod conform;
 mod corpus;
 mod effects;
 mod geometry;
 mod hostile;
+mod motion;
 mod packing;
 mod uris;
+mod variants;
 
 use std::sync::Arc;
 

@@ -92,22 +92,35 @@ impl<'a, 'b> TextureTable<'a, 'b> {
             SceneError::new(user, format!("texture {index} does not exist, the file has {count}"))
         })?;
         let place = format!("/textures/{index}");
-        let Some(source) = texture.source else {
-            let formats: Vec<&str> = texture.extensions.keys().map(String::as_str).collect();
-            let reason = match formats.as_slice() {
-                [] => "it has no image".to_owned(),
-                formats => format!("only {} has its image, which is not supported", formats.join(", ")),
-            };
-            return Err(SceneError::new(place, reason));
-        };
         let sampler = match texture.sampler {
             None => schema::Sampler::default(),
             Some(at) => *self.data.root.samplers.get(at).ok_or_else(|| {
                 SceneError::new(format!("{place}/sampler"), format!("sampler {at} does not exist"))
             })?,
         };
-        let picture = self.picture(source, &place)?;
+        let picture = self.best_picture(texture, &place)?;
         Ok(Found { picture, sampler })
+    }
+
+    /// The WebP image where there is one, else or if it is damaged the one that every reader knows.
+    fn best_picture(&mut self, texture: &schema::Texture, place: &str) -> Result<usize, SceneError> {
+        match (texture.extensions.webp, texture.source) {
+            (Some(webp), None) => self.picture(webp.source, place),
+            (Some(webp), Some(source)) => self.picture(webp.source, place).or_else(|error| {
+                let picture = self.picture(source, place)?;
+                self.warnings.push(error.with_help("the texture's other image is drawn in its place"));
+                Ok(picture)
+            }),
+            (None, Some(source)) => self.picture(source, place),
+            (None, None) => {
+                let formats: Vec<&str> = texture.extensions.others.keys().map(String::as_str).collect();
+                let reason = match formats.as_slice() {
+                    [] => "it has no image".to_owned(),
+                    formats => format!("only {} has its image, which is not supported", formats.join(", ")),
+                };
+                Err(SceneError::new(place, reason))
+            }
+        }
     }
 
     fn picture(&mut self, image: usize, user: &str) -> Result<usize, SceneError> {

@@ -138,6 +138,23 @@ pub(crate) fn data_payload(uri: &str) -> Option<Vec<u8>> {
     }
 }
 
+/// Whether a URI is as RFC 2397 or RFC 3986 wants it; some that are not are read all the same.
+pub(crate) fn is_well_formed(uri: &str) -> bool {
+    let Some(data) = uri.strip_prefix("data:") else { return percent_decode(uri).is_some() };
+    let Some((head, payload)) = data.split_once(',') else { return false };
+    let mut parameters = head.split(';').skip(1).peekable();
+    let is_base64 = head.ends_with(";base64");
+    while let Some(parameter) = parameters.next() {
+        let is_last = parameters.peek().is_none();
+        if !(parameter.contains('=') || is_base64 && is_last) {
+            return false;
+        }
+    }
+    let digits = payload.trim_end_matches('=');
+    let padded = payload.len().is_multiple_of(4) && payload.len() - digits.len() <= 2;
+    !is_base64 || !payload.is_empty() && padded && digits.bytes().all(|digit| sextet(digit).is_some())
+}
+
 /// RFC 4648 with the standard alphabet; padding optional, as exporters forget it.
 fn base64(text: &[u8]) -> Option<Vec<u8>> {
     let digits = text.strip_suffix(b"==").or_else(|| text.strip_suffix(b"=")).unwrap_or(text);

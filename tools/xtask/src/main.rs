@@ -14,6 +14,7 @@ use std::process::ExitCode;
 mod bench;
 mod bench_bake;
 mod bench_cache;
+mod bench_scenes;
 mod bench_shaders;
 mod corpus;
 mod packages;
@@ -26,6 +27,8 @@ cargo xtask test [--no-install]   install what tests need where that is allowed,
 cargo xtask bench [EDITS]         save-to-frame of shader and HDR edits, no-op bake, bake of one panorama
 cargo xtask bench cache           no-op bakes, planning, overhead and hashing on generated projects of up to 10 000 files
 cargo xtask bench shaders         save to first diagnostic, variants a second, what an edit runs, shaders in all languages
+cargo xtask bench scenes [MB] [RUNS]
+                                  time and memory of loading and packing a generated GLB (default 100 MB, 5 runs)
 cargo xtask bench bake […]        error and cost of prefiltered maps beside a sampled estimator; accuracy, sampled, time, scaling:
                                   one part alone; --huge: memory of a 16384×8192 panorama; panoramas from $KILN_CORPUS
 cargo xtask faults [COUNT]        kill COUNT processes at random moments and flip COUNT bits (default 1000)
@@ -45,6 +48,7 @@ fn main() -> ExitCode {
         ["bench"] => bench::run(20),
         ["bench", "cache"] => bench_cache::run(),
         ["bench", "shaders"] => bench_shaders::run(),
+        ["bench", "scenes", arguments @ ..] => bench_scenes::run(arguments),
         ["bench", "bake", arguments @ ..] => bench_bake::run(arguments),
         ["faults"] => test::faults("1000"),
         ["faults", count] => test::faults(count),

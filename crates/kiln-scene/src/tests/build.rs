@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 /// A .gltf with one buffer, embedded.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct File {
     pub root: Value,
     bin: Vec<u8>,
@@ -82,6 +82,11 @@ impl File {
             &mut self.root["bufferViews"],
             json!({"buffer": 0, "byteOffset": offset, "byteLength": bytes.len()}),
         )
+    }
+
+    /// The bytes of the file as it is so far.
+    pub fn bytes_of(&self) -> Vec<u8> {
+        self.clone().bytes()
     }
 
     /// The file's bytes, one JSON property a line.

@@ -249,3 +249,18 @@ fn fox_skinned_at_rest_is_where_it_was_modelled() {
         bounds: [[-12.592_718, -0.121_745, -88.095], [12.592_718, 78.907_19, 66.624_86]],
     });
 }
+
+#[test]
+fn animations_of_the_fox_are_read_whole() {
+    let Some(corpus) = corpus() else { return };
+    let packed = pack_file(&corpus, "gltf/khronos-sample-assets/Fox/glTF/Fox.gltf");
+    let scene = load(packed.glb.as_ref().unwrap()).unwrap();
+    let names: Vec<&str> = scene.animations.iter().map(|animation| animation.name.as_str()).collect();
+    assert_eq!(names, ["Survey", "Walk", "Run"]);
+    assert!(scene.animations.iter().all(|animation| !animation.channels.is_empty()));
+    assert!(
+        packed.diagnostics.iter().all(|it| !it.message.contains("/animations")),
+        "{:?}",
+        packed.diagnostics
+    );
+}

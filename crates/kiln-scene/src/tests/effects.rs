@@ -87,6 +87,80 @@ fn ior_and_specular_count_only_away_from_their_defaults_and_not_on_metal() {
 }
 
 #[test]
+fn specular_extension_counts_where_it_dims_or_tints() {
+    let layer = |values: Value| dielectric(json!({ "specular": values }));
+    assert_eq!(variant(layer(json!({})), &[]), "base");
+    assert_eq!(variant(layer(json!({"specularFactor": 1, "specularColorFactor": [1, 1, 1]})), &[]), "base");
+    assert_eq!(variant(layer(json!({"specularFactor": 0.5})), &[]), "specular");
+    assert_eq!(variant(layer(json!({"specularColorFactor": [1, 1, 0.5]})), &[]), "specular");
+    let dimmed = || layer(json!({"specularTexture": {"index": 0}}));
+    assert_eq!(variant(dimmed(), &[[0, 0, 0, 255]]), "base", "only alpha is read");
+    assert_eq!(variant(dimmed(), &[[255, 255, 255, 254]]), "specular");
+    let tinted = || layer(json!({"specularColorTexture": {"index": 0}}));
+    assert_eq!(variant(tinted(), &[[255, 255, 255, 0]]), "base", "alpha is not read");
+    assert_eq!(variant(tinted(), &[[255, 254, 255, 255]]), "specular");
+    assert_eq!(variant(dielectric(json!({"ior": {}})), &[]), "base");
+    assert_eq!(variant(dielectric(json!({"ior": {"ior": 0}})), &[]), "specular");
+}
+
+#[test]
+fn transmission_needs_a_factor_a_texture_with_red_and_no_metal() {
+    let glass = |factor: f64| dielectric(json!({"transmission": {"transmissionFactor": factor}}));
+    assert_eq!(variant(glass(0.0), &[]), "base");
+    assert_eq!(variant(glass(0.5), &[]), "transmission");
+    let mut metal = glass(1.0);
+    metal["pbrMetallicRoughness"]["metallicFactor"] = json!(1);
+    assert_eq!(variant(metal, &[]), "base");
+    let textured = || {
+        dielectric(json!({"transmission": {"transmissionFactor": 1, "transmissionTexture": {"index": 0}}}))
+    };
+    assert_eq!(variant(textured(), &[[0, 255, 255, 255]]), "base");
+    assert_eq!(variant(textured(), &[[1, 0, 0, 255]]), "transmission");
+}
+
+#[test]
+fn sheen_textures_and_scales_of_zero_are_nothing() {
+    let cloth =
+        || dielectric(json!({"sheen": {"sheenColorFactor": [1, 1, 1], "sheenColorTexture": {"index": 0}}}));
+    assert_eq!(variant(cloth(), &[[0, 0, 0, 255]]), "base");
+    assert_eq!(variant(cloth(), &[[0, 1, 0, 255]]), "sheen");
+    let bumpy = |scale: f64| json!({"normalTexture": {"index": 0, "scale": scale}});
+    assert_eq!(variant(bumpy(0.0), &[[160, 120, 240, 255]]), "base");
+    let dark = |strength: f64| json!({"occlusionTexture": {"index": 0, "strength": strength}});
+    assert_eq!(variant(dark(0.0), &[[0; 4]]), "base");
+    assert_eq!(variant(dark(0.5), &[[0; 4]]), "occlusion");
+    let coat = |scale: f64| {
+        extension(
+            "KHR_materials_clearcoat",
+            json!({"clearcoatFactor": 1, "clearcoatNormalTexture": {"index": 0, "scale": scale}}),
+        )
+    };
+    let mapped = |scale| {
+        let file = File::with_material(coat(scale)).texture([160, 120, 240, 255]);
+        scene_of(&file.bytes()).materials[0].clearcoat_normal_texture.is_some()
+    };
+    assert_eq!([mapped(1.0), mapped(0.0)], [true, false]);
+}
+
+#[test]
+fn specular_glossiness_alone_calls_for_nothing() {
+    let plain = || extension("KHR_materials_pbrSpecularGlossiness", json!({}));
+    assert_eq!(variant(plain(), &[]), "base");
+    let mut glowing = plain();
+    glowing["emissiveFactor"] = json!([0, 0, 1]);
+    assert_eq!(variant(glowing, &[]), "emission");
+}
+
+#[test]
+fn unlit_keeps_alpha_and_vertex_colours() {
+    let mut material = extension("KHR_materials_unlit", json!({}));
+    material["alphaMode"] = json!("BLEND");
+    assert_eq!(variant(material.clone(), &[]), "unlit");
+    material["pbrMetallicRoughness"] = json!({"baseColorFactor": [1, 1, 1, 0.5]});
+    assert_eq!(variant(material, &[]), "alpha_blend+unlit");
+}
+
+#[test]
 fn transmission_is_an_effect_with_a_note() {
     let mut material = extension("KHR_materials_transmission", json!({"transmissionFactor": 1.0}));
     material["pbrMetallicRoughness"] = json!({"metallicFactor": 0.0});

@@ -46,7 +46,8 @@ fn zero_normal_is_replaced_by_its_triangles() {
     assert_eq!(normals[0], [0.0, 0.0, 1.0]);
     check_within("made unit", &normals[1], &[0.0, 0.6, 0.8], 1e-6);
     assert_eq!(normals[2], [0.0, 0.0, 1.0]);
-    assert!(scene.notes[0].contains("2 vertices without a usable normal"), "{:?}", scene.notes);
+    assert!(scene.notes[0].contains("1 normals did not have length 1"), "{:?}", scene.notes);
+    assert!(scene.notes[1].contains("2 vertices without a usable normal"), "{:?}", scene.notes);
 }
 
 #[test]
@@ -138,6 +139,24 @@ fn skinned_vertices_follow_their_joints_and_not_their_node() {
 }
 
 #[test]
+fn joint_weights_that_do_not_sum_up_to_one_are_noted() {
+    let notes = |weight: f32| {
+        let mut file = File::triangle();
+        let joints = file.accessor(&[0; 12], 5121, 3, "VEC4");
+        let weights = file.floats(&[[1.0, 0.0, 0.0, 0.0], [weight, 0.5, 0.0, 0.0], [weight, 0.5, 0.0, 0.0]]);
+        let primitive = file.primitive();
+        primitive["attributes"]["JOINTS_0"] = json!(joints);
+        primitive["attributes"]["WEIGHTS_0"] = json!(weights);
+        file.root["skins"] = json!([{"joints": [0]}]);
+        file.root["nodes"][0]["skin"] = json!(0);
+        scene_of(&file.bytes()).notes
+    };
+    assert_eq!(notes(0.5), [""; 0]);
+    assert!(notes(0.25)[0].contains("2 vertices have joint weights"), "{:?}", notes(0.25));
+    assert!(notes(-0.5)[0].contains("2 vertices have joint weights"), "{:?}", notes(-0.5));
+}
+
+#[test]
 fn default_morph_weights_move_vertices_and_a_node_overrides_its_mesh() {
     let mut file = File::triangle();
     let deltas = file.floats(&[[0.0, 0.0, 0.0], [0.0, 0.0, 8.0], [0.0, 0.0, 0.0]]);
@@ -188,4 +207,83 @@ fn bounds_are_those_of_the_placed_geometry() {
     let bounds = scene_of(&file.bytes()).bounds.unwrap();
     assert_eq!(bounds.min.to_array(), [10.0, 0.0, 0.0]);
     assert_eq!(bounds.max.to_array(), [14.0, 2.0, 0.0]);
+}
+
+/// A triangle that hangs on the given joints, joint j of which is 2^j higher than it was modelled.
+fn hung(sets: &[(Vec<u8>, u32, Vec<u8>)]) -> Vec<[f32; 3]> {
+    let mut file = File::triangle();
+    for (set, (joints, component, weights)) in sets.iter().enumerate() {
+        let joints = file.accessor(joints, 5121, 3, "VEC4");
+        let weights = file.accessor(weights, *component, 3, "VEC4");
+        file.root["accessors"][weights]["normalized"] = json!(*component != 5126);
+        let attributes = &mut file.primitive()["attributes"];
+        attributes[format!("JOINTS_{set}")] = json!(joints);
+        attributes[format!("WEIGHTS_{set}")] = json!(weights);
+    }
+    let joints: Vec<usize> = (1..9).collect();
+    file.root["skins"] = json!([{ "joints": joints }]);
+    let mut nodes = vec![json!({"mesh": 0, "skin": 0})];
+    nodes.extend((0..8).map(|joint| json!({"translation": [0, 0, f64::powi(2.0, joint)]})));
+    file.root["nodes"] = json!(nodes);
+    let all: Vec<usize> = (0..9).collect();
+    file.root["scenes"][0]["nodes"] = json!(all);
+    scene_of(&file.bytes()).primitives[0].vertices.iter().map(|vertex| vertex.position).collect()
+}
+
+#[test]
+fn eight_influences_of_two_sets_count_alike() {
+    let joints = |first: u8| [[first, first + 1, first + 2, first + 3]; 3].concat();
+    let weights: Vec<u8> = std::iter::repeat_n(0.125f32, 12).flat_map(f32::to_le_bytes).collect();
+    let moved = hung(&[(joints(0), 5126, weights.clone()), (joints(4), 5126, weights.clone())]);
+    check_within("mean of 1, 2 … 128", &[moved[0][2], moved[2][2]], &[255.0 / 8.0; 2], 1e-5);
+    let first_set_alone = hung(&[(joints(0), 5126, weights)]);
+    check_within("mean of 1, 2, 4, 8", &[first_set_alone[0][2]], &[15.0 / 4.0], 1e-5);
+}
+
+#[test]
+fn normalised_integer_weights_are_shares() {
+    let joints = || [[0, 1, 0, 0]; 3].concat();
+    let bytes = [[51, 204, 0, 0], [255, 0, 0, 0], [0, 255, 0, 0]].concat();
+    let heights = |moved: Vec<[f32; 3]>| -> [f32; 3] { std::array::from_fn(|at| moved[at][2]) };
+    check_within("bytes", &heights(hung(&[(joints(), 5121, bytes)])), &[1.8, 1.0, 2.0], 1e-5);
+    let shorts = [[13_107u16, 52_428, 0, 0], [65_535, 0, 0, 0], [0, 65_535, 0, 0]].concat();
+    let shorts: Vec<u8> = shorts.into_iter().flat_map(u16::to_le_bytes).collect();
+    check_within("shorts", &heights(hung(&[(joints(), 5123, shorts)])), &[1.8, 1.0, 2.0], 1e-5);
+}
+
+#[test]
+fn morphs_move_normals_and_tangents_and_may_be_sparse() {
+    let mut file = File::with_material(json!({"normalTexture": {"index": 0}})).texture([160, 120, 240, 255]);
+    let tangents = file.floats(&[[1.0, 0.0, 0.0, 1.0]; 3]);
+    file.primitive()["attributes"]["TANGENT"] = json!(tangents);
+    let indices = file.view(&[2, 0]);
+    let values: Vec<u8> = [0.0f32, 0.0, 6.0].iter().flat_map(|value| value.to_le_bytes()).collect();
+    let values = file.view(&values);
+    let list = file.root["accessors"].as_array_mut().unwrap();
+    list.push(json!({"componentType": 5126, "count": 3, "type": "VEC3", "sparse": {"count": 1,
+        "indices": {"bufferView": indices, "componentType": 5123}, "values": {"bufferView": values}}}));
+    let positions = list.len() - 1;
+    let normals = file.floats(&[[0.0, 2.0, 0.0]; 3]);
+    let along = file.floats(&[[-1.0, 1.0, 0.0]; 3]);
+    file.primitive()["targets"] = json!([{"POSITION": positions}, {"NORMAL": normals, "TANGENT": along}]);
+    file.root["meshes"][0]["weights"] = json!([0.5, 0.5]);
+    let scene = scene_of(&file.bytes());
+    let vertices = &scene.primitives[0].vertices;
+    assert_eq!([0, 1, 2].map(|at| vertices[at].position[2]), [0.0, 0.0, 3.0]);
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    check_within("normal", &vertices[0].normal, &[0.0, half, half], 1e-6);
+    check_within("tangent", &vertices[0].tangent, &[half, half, 0.0, 1.0], 1e-6);
+}
+
+#[test]
+fn weights_beyond_the_targets_and_targets_beyond_the_weights_change_nothing() {
+    let mut file = File::triangle();
+    let deltas = file.floats(&[[0.0, 0.0, 8.0]; 3]);
+    file.primitive()["targets"] = json!([{"POSITION": deltas}, {"POSITION": deltas}]);
+    file.root["nodes"] =
+        json!([{"mesh": 0, "weights": [0.5]}, {"mesh": 0, "weights": [0, 0.25, 9]}, {"mesh": 0}]);
+    file.root["scenes"][0]["nodes"] = json!([0, 1, 2]);
+    let scene = scene_of(&file.bytes());
+    let z = |draw: usize| scene.primitives[scene.draws[draw].primitive].vertices[1].position[2];
+    assert_eq!([z(0), z(1), z(2)], [4.0, 2.0, 0.0]);
 }

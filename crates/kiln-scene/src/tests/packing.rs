@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use kiln_diagnostic::Severity;
 use serde_json::json;
 
 use super::build::File;
@@ -31,7 +32,10 @@ fn rich() -> Vec<u8> {
         {"camera": 0, "translation": [0.1, 0.2, 0.3], "name": "main"},
         {"extensions": {"KHR_lights_punctual": {"light": 0}}},
     ]);
-    file.root["animations"] = json!([{}]);
+    file.root["animations"] = json!([{
+        "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}],
+        "samplers": [{"input": 0, "output": 0}],
+    }]);
     file.bytes()
 }
 
@@ -49,7 +53,9 @@ fn pack_of_a_pack_is_the_same_pack() {
     assert!(again == glb, "{}", super::first_difference(again, glb));
     assert_eq!(second.effects, first.effects);
     assert_eq!(second.summary, first.summary);
-    assert_eq!(second.diagnostics, first.diagnostics);
+    // Places where the source is at fault mean nothing in the pack.
+    let notes = first.diagnostics.into_iter().filter(|it| it.severity != Severity::Warning);
+    assert_eq!(second.diagnostics, notes.collect::<Vec<_>>());
 }
 
 #[test]
@@ -69,7 +75,8 @@ fn pack_keeps_what_is_drawn_and_says_what_is_not() {
     for wanted in ["rest pose", "punctual lights"] {
         assert!(notes.contains(wanted), "{notes}");
     }
-    assert_eq!(scene.notes.len(), packed.diagnostics.len());
+    let remembered = packed.diagnostics.iter().filter(|it| it.severity == Severity::Note);
+    assert_eq!(scene.notes.len(), remembered.count());
 }
 
 #[test]
