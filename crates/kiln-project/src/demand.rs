@@ -125,7 +125,7 @@ fn env_demand(project: &Project, name: &str, env: &EnvConfig, scenes: &[SceneDem
     let mut demand =
         EnvDemand { light: Vec::new(), specular: vec![Vec::new(); count], sheen: vec![Vec::new(); count] };
     let every_level = |levels: &mut Vec<Reasons>, reason: &str| {
-        levels.iter_mut().for_each(|level| level.push(said(reason)))
+        levels.iter_mut().for_each(|level| level.push(said(reason)));
     };
     if env.has_sheen {
         every_level(&mut demand.sheen, "`sheen = true`");

@@ -98,7 +98,7 @@ fn merged(made: Vec<(String, &Reasons)>) -> Vec<(String, &Reasons)> {
     for (what, reasons) in made {
         match merged.last_mut() {
             Some((last, known)) if *known == reasons && is_next_level(last, &what) => {
-                extend_levels(last, &what)
+                extend_levels(last, &what);
             }
             _ => merged.push((what, reasons)),
         }
