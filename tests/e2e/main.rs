@@ -8,6 +8,7 @@ mod bad_input;
 mod bake;
 mod ci;
 mod corpus;
+mod demand;
 mod demo;
 mod environments;
 mod faults;

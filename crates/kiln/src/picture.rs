@@ -6,6 +6,8 @@ use std::fmt::Write as _;
 use kiln_build::{ActionId, Forecast, Input};
 use kiln_project::{PartSpec, Plan, Reason, Skipped};
 
+use crate::commands::demand;
+
 /// Sizes of the SVG, in pixels.
 const ROW: usize = 26;
 const BOX: usize = 20;
@@ -125,7 +127,7 @@ impl Picture {
 
     /// Materials, the effects that they call for, and the maps, levels and variants that follow; what is left out stands
     /// below.
-    pub(crate) fn of_demand(plan: &Plan, skipped: &[Skipped]) -> Picture {
+    pub(crate) fn of_demand(plan: &Plan, skipped: Vec<Skipped>) -> Picture {
         let mut picture = Picture { nodes: Vec::new() };
         let mut materials: BTreeMap<(String, String), usize> = BTreeMap::new();
         let mut variants: BTreeMap<String, usize> = BTreeMap::new();
@@ -144,7 +146,7 @@ impl Picture {
                 picture.nodes[effects].reads.insert(from);
             }
         }
-        for (what, reasons) in kiln_project::made(plan) {
+        for (what, reasons) in demand::merged(kiln_project::made(plan)) {
             let made = picture.add(what, Kind::Target);
             let readers = reasons.iter().filter_map(|reason| match reason {
                 Reason::Material { scene, material, .. } => {
@@ -156,8 +158,8 @@ impl Picture {
         }
         picture.assign_columns();
         let last = picture.nodes.iter().map(|node| node.column).max().unwrap_or(0);
-        for skipped in skipped {
-            let skipped = picture.add(skipped.what.clone(), Kind::Skipped);
+        for group in demand::groups(skipped) {
+            let skipped = picture.add(group.what, Kind::Skipped);
             picture.nodes[skipped].column = last;
         }
         picture

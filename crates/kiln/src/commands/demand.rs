@@ -93,7 +93,7 @@ fn listed(names: &BTreeSet<String>) -> String {
 }
 
 /// Levels with the same readers on one line.
-fn merged(made: Vec<(String, &Reasons)>) -> Vec<(String, &Reasons)> {
+pub(crate) fn merged(made: Vec<(String, &Reasons)>) -> Vec<(String, &Reasons)> {
     let mut merged: Vec<(String, &Reasons)> = Vec::new();
     for (what, reasons) in made {
         match merged.last_mut() {
@@ -120,14 +120,14 @@ fn extend_levels(last: &mut String, what: &str) {
 }
 
 /// Skipped levels that are skipped for one reason.
-struct Group {
-    what: String,
+pub(crate) struct Group {
+    pub(crate) what: String,
     because: String,
     bytes: u64,
     about_ms: Option<f64>,
 }
 
-fn groups(skipped: Vec<Skipped>) -> Vec<Group> {
+pub(crate) fn groups(skipped: Vec<Skipped>) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for Skipped { what, because, bytes, about_ms } in skipped {
         match groups.last_mut() {

@@ -24,7 +24,7 @@ pub(crate) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
     engine.save_memory().context("remembering the sources")?;
     let plan_ms = start.elapsed().as_secs_f64() * 1e3;
     if let Some(path) = &args.svg {
-        let svg = Picture::of_demand(&plan, &kiln_project::skipped(&engine, &plan)).to_svg();
+        let svg = Picture::of_demand(&plan, kiln_project::skipped(&engine, &plan)).to_svg();
         kiln_build::write_atomically(&kiln_build::Disk, path, svg.as_bytes())
             .context("writing the picture")?;
     }
