@@ -77,7 +77,7 @@ fn cloth_that_comes_and_goes_brings_and_takes_exactly_its_own_under_a_daemon() {
     let mut added: Vec<&String> = with.table.targets.keys().collect();
     added.retain(|name| !without.table.targets.contains_key(*name));
     let is_expected = |name: &&String| name.ends_with("/sheen") || *name == "lut/charlie";
-    assert!(added.len() >= 3 && added.iter().all(|name| is_expected(name)), "{added:?}");
+    assert!(added.len() >= 3 && added.iter().all(is_expected), "{added:?}");
     project.edit("scenes/material_balls.gltf", CLOTH, NO_CLOTH);
     watch.published();
     let names = |revision: &kiln_link::Revision| revision.table.targets.keys().cloned().collect::<Vec<_>>();
