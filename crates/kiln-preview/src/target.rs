@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use kiln_diagnostic::Diagnostic;
 use kiln_image::ktx2;
 use kiln_link::Target;
-use kiln_scene::EffectSet;
+use kiln_scene::EffectOverrides;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
@@ -70,22 +70,6 @@ pub(crate) struct ProjectMeta {
     /// What scenes are drawn with besides, and without.
     #[serde(default)]
     pub effects: EffectOverrides,
-}
-
-/// `[effects]` of kiln.toml.
-#[derive(Clone, Debug, Default, Deserialize)]
-pub(crate) struct EffectOverrides {
-    #[serde(default)]
-    force: EffectSet,
-    #[serde(default)]
-    forbid: EffectSet,
-}
-
-impl EffectOverrides {
-    /// The effects that a material is drawn with.
-    pub fn apply(&self, effects: &EffectSet) -> EffectSet {
-        effects.union(&self.force).filter(|effect| !self.forbid.contains(effect)).copied().collect()
-    }
 }
 
 /// What a shader is for.

@@ -4,12 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use kiln_diagnostic::Diagnostic;
-use kiln_scene::Effect;
+use kiln_scene::{Effect, EffectOverrides};
 use kiln_shader::{Language, Program};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::demand::EffectOverrides;
 use crate::env_config::{EnvConfig, read_env};
 use crate::lut_config::{LutConfig, read_lut};
 use crate::reader::{Document, Section, suggest};

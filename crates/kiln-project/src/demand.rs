@@ -8,8 +8,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use kiln_bake::RoughnessLaw;
-use kiln_scene::{Effect, EffectSet, LightReads, MaterialEffects};
-use serde_json::{Value, json};
+use kiln_scene::{Effect, EffectOverrides, LightReads, MaterialEffects};
 
 use crate::{EnvConfig, Project};
 
@@ -67,15 +66,6 @@ pub struct EnvDemand {
     pub sheen: Vec<Reasons>,
 }
 
-/// `[effects]` of kiln.toml: what materials have besides what their values call for, and what they may not have.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct EffectOverrides {
-    /// Every material has these.
-    pub force: EffectSet,
-    /// No material has these.
-    pub forbid: EffectSet,
-}
-
 /// Widest that the shipped shaders make a lobe to cover how a normal turns within a pixel, added to α² (`alpha2_filtered`
 /// of shaders/lib/brdf.wgsl; Tokuyoshi and Kaplanyan 2019).
 const FILTERING_ALPHA2: f64 = 0.18;
@@ -83,35 +73,23 @@ const FILTERING_ALPHA2: f64 = 0.18;
 /// A level that is read by less than this much of a level is not: roughness factors are decimal fractions in binary.
 const LEVEL_SLACK: f64 = 1e-4;
 
-impl EffectOverrides {
-    /// The effects that a material is drawn with.
-    pub fn apply(&self, effects: &EffectSet) -> EffectSet {
-        effects.union(&self.force).filter(|effect| !self.forbid.contains(effect)).copied().collect()
+/// A material as the overrides leave it, with what it reads. What is forced has no values to go by: all of its lobe is read.
+pub(crate) fn overridden(overrides: &EffectOverrides, material: &MaterialEffects) -> MaterialEffects {
+    let effects = overrides.apply(&material.effects);
+    let LightReads { mut ggx, mut charlie } = material.reads;
+    if overrides.force.contains(&Effect::Sheen) && charlie.is_none() {
+        charlie = Some([0.0, 1.0]);
     }
-
-    /// The same of a material, with what it reads. What is forced has no values to go by: all of its lobe is read.
-    pub(crate) fn apply_to(&self, material: &MaterialEffects) -> MaterialEffects {
-        let effects = self.apply(&material.effects);
-        let LightReads { mut ggx, mut charlie } = material.reads;
-        if self.force.contains(&Effect::Sheen) && charlie.is_none() {
-            charlie = Some([0.0, 1.0]);
-        }
-        if self.forbid.contains(&Effect::Unlit) && ggx.is_none() {
-            ggx = Some([0.0, 1.0]);
-        }
-        if effects.contains(&Effect::Unlit) {
-            (ggx, charlie) = (None, None);
-        }
-        if !effects.contains(&Effect::Sheen) {
-            charlie = None;
-        }
-        MaterialEffects { effects, reads: LightReads { ggx, charlie }, ..material.clone() }
+    if overrides.forbid.contains(&Effect::Unlit) && ggx.is_none() {
+        ggx = Some([0.0, 1.0]);
     }
-
-    /// As targets tell it to whoever draws; `None` if nothing is overridden.
-    pub(crate) fn to_json(&self) -> Option<Value> {
-        (*self != EffectOverrides::default()).then(|| json!({"force": self.force, "forbid": self.forbid}))
+    if effects.contains(&Effect::Unlit) {
+        (ggx, charlie) = (None, None);
     }
+    if !effects.contains(&Effect::Sheen) {
+        charlie = None;
+    }
+    MaterialEffects { effects, reads: LightReads { ggx, charlie }, ..material.clone() }
 }
 
 /// What each environment of a project is asked for.

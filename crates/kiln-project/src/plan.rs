@@ -11,7 +11,10 @@ use kiln_diagnostic::{Diagnostic, has_errors};
 use serde_json::{Map, Value, json};
 
 use crate::demand::env_demands;
-use crate::{EnvDemand, PROJECT_FILE, Project, SceneDemand, environment, lut, parse_project, scene, shader};
+use crate::{
+    EffectOverrides, EnvDemand, PROJECT_FILE, Project, SceneDemand, environment, lut, parse_project, scene,
+    shader,
+};
 
 /// What must be done for a project, before any of it is done.
 pub struct Plan {
@@ -197,8 +200,8 @@ pub(crate) fn plan_project(
     if !unread.is_empty() {
         meta["unread"] = json!(unread);
     }
-    if let Some(overrides) = project.effects.to_json() {
-        meta["effects"] = overrides;
+    if project.effects != EffectOverrides::default() {
+        meta["effects"] = json!(project.effects);
     }
     planner.target("project".to_owned(), "project", meta, Vec::new());
     let Planner { graph, targets, diagnostics, subjects } = planner;

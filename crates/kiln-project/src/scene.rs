@@ -9,6 +9,7 @@ use kiln_scene::{MaterialEffects, variant_name};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use crate::demand::overridden;
 use crate::environment::{command, failure};
 use crate::plan::{PartSpec, Planner, no_content, rank, unreadable};
 use crate::shader::Variants;
@@ -40,7 +41,7 @@ pub(crate) fn plan_scene(
     let materials = found.materials.or_else(|| last_materials(engine, name));
     let is_known = materials.is_some();
     let materials: Vec<MaterialEffects> =
-        materials.iter().flatten().map(|material| overrides.apply_to(material)).collect();
+        materials.iter().flatten().map(|material| overridden(overrides, material)).collect();
     for material in &materials {
         let features = material.effects.iter().map(|effect| effect.name().to_owned());
         variants.ask(&config.shader, features.collect());

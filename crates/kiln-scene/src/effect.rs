@@ -53,6 +53,23 @@ impl Effect {
     }
 }
 
+/// What materials have besides what their values call for, and what they may not have.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct EffectOverrides {
+    /// Every material has these.
+    pub force: EffectSet,
+    /// No material has these.
+    pub forbid: EffectSet,
+}
+
+impl EffectOverrides {
+    /// The effects that a material is drawn with.
+    pub fn apply(&self, effects: &EffectSet) -> EffectSet {
+        effects.union(&self.force).filter(|effect| !self.forbid.contains(effect)).copied().collect()
+    }
+}
+
 /// Name of the shader variant: the effects' names in alphabetical order joined by `+`, or `base` for none.
 pub fn variant_name(effects: &EffectSet) -> String {
     let mut names: Vec<&str> = effects.iter().map(|effect| effect.name()).collect();

@@ -15,7 +15,7 @@
 //! Not here: files (a caller resolves URIs), GPU resources (`kiln-preview`), which lobes to bake (`kiln-project`).
 
 pub use animation::{Animation, Channel, Curve, Interpolation, Target};
-pub use effect::variant_name;
+pub use effect::{EffectOverrides, variant_name};
 pub use error::SceneError;
 pub use images::decode_image;
 
