@@ -24,3 +24,4 @@ struct Frame {
 @group(0) @binding(7) var hdr_color: texture_2d<f32>;
 @group(0) @binding(8) var env_sheen: texture_cube<f32>;
 @group(0) @binding(9) var lut_charlie: texture_2d<f32>;
+@group(0) @binding(11) var scene_color: texture_2d<f32>;

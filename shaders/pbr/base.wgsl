@@ -7,7 +7,8 @@ import lib::vector::max_component;
 @if(diffuse_transmission) import super::diffuse_transmission::{light_from_behind, Scattering};
 @if(transmission && dispersion) import super::dispersion::dispersed_radiance;
 @if(iridescence) import super::iridescence::{Film, iridescent_f0};
-@if(transmission && !dispersion) import super::transmission::refracted_radiance;
+@if(transmission && !dispersion) import super::transmission::transmitted_radiance;
+@if(transmission) import super::transmission::Entry;
 
 // Directions have unit length and point away from the surface.
 struct Base {
@@ -20,6 +21,7 @@ struct Base {
     @if(anisotropy) mirror_normal: vec3f,
     view: vec3f,
     occlusion: f32,
+    @if(transmission) entry: Entry,
     @if(transmission) transmission: f32,
     @if(transmission) ior: f32,
     // What is left of light that passes the medium.
@@ -58,8 +60,8 @@ fn base_radiance(base: Base) -> vec3f {
         diffuse = mix(diffuse, behind, base.scattering.share);
     }
     @if(transmission) {
-        @if(dispersion) let behind = dispersed_radiance(base.view, base.normal, roughness, base.ior);
-        @else let behind = refracted_radiance(base.view, base.normal, roughness, base.ior);
+        @if(dispersion) let behind = dispersed_radiance(base.entry, base.ior);
+        @else let behind = transmitted_radiance(base.entry, base.ior);
         @if(volume) let through = behind * base.transmittance;
         @else let through = behind;
         diffuse = mix(diffuse, below * through, base.transmission);

@@ -16,7 +16,7 @@ import super::interface::{base_color_sampler, draw, material, Varying, Vertex};
 @if(sheen && !unlit) import super::sheen::{sheen, under_sheen};
 @if(specular && !unlit) import super::specular::dielectric_reflectance;
 @if(transmission && !unlit) import super::transmission::transmission;
-@if((diffuse_transmission || transmission) && volume && !unlit) import super::volume::medium_transmittance;
+@if((diffuse_transmission || transmission) && volume && !unlit) import super::volume::{medium_depth, medium_transmittance};
 
 @group(1) @binding(1) var base_color_texture: texture_2d<f32>;
 @if(!unlit) @group(1) @binding(3) var metallic_roughness_texture: texture_2d<f32>;
@@ -105,7 +105,17 @@ fn base_layer(in: Varying, color: vec3f, geometric_normal: vec3f, facing: f32, v
     @if(occlusion && !unlit) base.occlusion = ambient_occlusion(in);
     @if(transmission && !unlit) base.transmission = transmission(in);
     @if(transmission && !unlit) base.ior = material.ior;
-    @if((diffuse_transmission || transmission) && volume) base.transmittance = medium_transmittance(in, base.normal);
+    @if(transmission) {
+        base.entry.position = in.world_position;
+        base.entry.normal = base.normal;
+        base.entry.view = view;
+        base.entry.perceptual_roughness = base.perceptual_roughness;
+    }
+    @if((diffuse_transmission || transmission) && volume) {
+        let depth = medium_depth(in, base.normal);
+        base.transmittance = medium_transmittance(depth);
+        @if(transmission) base.entry.depth = depth;
+    }
     @if(diffuse_transmission) base.metallic = metallic;
     @if(diffuse_transmission) base.scattering = scattering(in);
     @if(iridescence) base.film = film(in);

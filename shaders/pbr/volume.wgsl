@@ -7,12 +7,16 @@ import super::interface::{base_color_sampler, draw, material, Varying};
 
 @group(1) @binding(30) var thickness_texture: texture_2d<f32>;
 
-// Share of light left after the thickness below a point.
-fn medium_transmittance(in: Varying, normal: vec3f) -> vec3f {
+// World units through the medium below a point.
+fn medium_depth(in: Varying, normal: vec3f) -> f32 {
     let uv = texture_coordinate(material.thickness_uv_u, material.thickness_uv_v, in.uv0, in.uv1);
     let thickness = material.thickness_factor * textureSample(thickness_texture, base_color_sampler, uv).g;
-    let distance = thickness * object_scale_along(normal);
-    return volume_attenuation(distance, material.attenuation_color, material.attenuation_distance);
+    return thickness * object_scale_along(normal);
+}
+
+// Share of light left after that way.
+fn medium_transmittance(depth: f32) -> vec3f {
+    return volume_attenuation(depth, material.attenuation_color, material.attenuation_distance);
 }
 
 // World units to one of the object's, along a world normal: thickness is given in the object's units, distances in the world's.

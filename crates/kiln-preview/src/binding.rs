@@ -23,12 +23,12 @@ pub(crate) struct FrameBinding {
 }
 
 impl FrameBinding {
-    /// Binds the environment, and for tonemaps the picture they read.
+    /// Binds the environment, and the picture that the program reads if it is one that does.
     pub fn new(
         gpu: &Gpu,
         program: &Program,
         environment: &Environment,
-        hdr_color: Option<&wgpu::TextureView>,
+        picture: Option<&wgpu::TextureView>,
     ) -> Self {
         let frame = program.groups[0].iter().find(|bound| bound.slot == Slot::Frame);
         let block = frame.map(|bound| (uniform_buffer(gpu, bound, Vec::new()), bound.clone()));
@@ -44,7 +44,7 @@ impl FrameBinding {
                 Slot::EnvSheen => Some(&environment.sheen.view),
                 Slot::LutGgx => Some(&environment.lut_ggx.view),
                 Slot::LutCharlie => Some(&environment.lut_charlie.view),
-                Slot::HdrColor => hdr_color,
+                Slot::HdrColor | Slot::SceneColor => picture,
                 _ => None,
             };
             view.map(wgpu::BindingResource::TextureView)
@@ -61,11 +61,6 @@ impl FrameBinding {
                 pass.set_bind_group(index, group, &[]);
             }
         }
-    }
-
-    /// Whether pictures change with time.
-    pub fn reads_time(&self) -> bool {
-        self.block.as_ref().is_some_and(|(_, bound)| bound.reads_time())
     }
 
     /// Writes this frame's values and those of the author's parameters.

@@ -7,8 +7,7 @@ use glam::{Mat4, Vec3};
 use kiln_gpu::Gpu;
 use kiln_scene::{AlphaMode, Draw, Material};
 
-use crate::binding::{FrameBinding, draw_group, material_group};
-use crate::prepare::Environment;
+use crate::binding::{draw_group, material_group};
 use crate::program::{Program, Raster};
 use crate::scene_gpu::GpuScene;
 use crate::uniform::{draw_member, fill_block};
@@ -31,7 +30,7 @@ pub(crate) struct DrawItem {
 /// What all draws of a program share.
 #[derive(Debug)]
 pub(crate) struct ProgramBinding {
-    pub frame: FrameBinding,
+    pub program: Arc<Program>,
     pub draw_group: Option<wgpu::BindGroup>,
 }
 
@@ -41,6 +40,8 @@ pub(crate) struct DrawList {
     pub programs: Vec<ProgramBinding>,
     /// Hide what lies behind; any order.
     pub opaque: Vec<DrawItem>,
+    /// Show what is opaque behind them; to be drawn after it, from far to near.
+    pub transmissive: Vec<DrawItem>,
     /// Blended over what lies behind; to be drawn from far to near.
     pub blended: Vec<DrawItem>,
 }
@@ -49,24 +50,28 @@ pub(crate) struct DrawList {
 pub(crate) type FindProgram<'a> = &'a mut dyn FnMut(&Material) -> Option<Arc<Program>>;
 
 impl DrawList {
+    /// Whether anything reads what is opaque behind it.
+    pub fn reads_scene_color(&self) -> bool {
+        self.programs.iter().any(|binding| binding.program.reads_scene_color())
+    }
+
     /// Resolves every draw of the scene; materials without a program are left out.
-    pub fn new(
-        gpu: &Gpu,
-        scene: &GpuScene,
-        environment: &Environment,
-        find_program: FindProgram<'_>,
-    ) -> Self {
+    pub fn new(gpu: &Gpu, scene: &GpuScene, find_program: FindProgram<'_>) -> Self {
         let mut builder = Builder { gpu, scene, programs: Vec::new(), material_groups: HashMap::new() };
         let mut list = DrawList::default();
         for draw in &scene.scene.draws {
             let Some(primitive) = scene.scene.primitives.get(draw.primitive) else { continue };
             let Some(material) = scene.scene.materials.get(primitive.material) else { continue };
             let Some(program) = find_program(material) else { continue };
-            let is_blended = material.alpha_mode == AlphaMode::Blend;
             let items = builder.items(draw, primitive.material, material, &program);
-            if is_blended { list.blended.extend(items) } else { list.opaque.extend(items) }
+            let group = match material.alpha_mode {
+                AlphaMode::Blend => &mut list.blended,
+                _ if program.reads_scene_color() => &mut list.transmissive,
+                _ => &mut list.opaque,
+            };
+            group.extend(items);
         }
-        list.programs = builder.bindings(environment);
+        list.programs = builder.bindings();
         list
     }
 }
@@ -124,13 +129,13 @@ impl Builder<'_> {
         offset as u32
     }
 
-    fn bindings(self, environment: &Environment) -> Vec<ProgramBinding> {
+    fn bindings(self) -> Vec<ProgramBinding> {
         let gpu = self.gpu;
-        let bind = |(program, blocks): &(Arc<Program>, Vec<u8>)| ProgramBinding {
-            frame: FrameBinding::new(gpu, program, environment, None),
-            draw_group: draw_group(gpu, program, blocks),
+        let bind = |(program, blocks): (Arc<Program>, Vec<u8>)| {
+            let draw_group = draw_group(gpu, &program, &blocks);
+            ProgramBinding { program, draw_group }
         };
-        self.programs.iter().map(bind).collect()
+        self.programs.into_iter().map(bind).collect()
     }
 }
 

@@ -106,6 +106,12 @@ impl HeadlessViewer {
         RgbaImage::from_raw(width, height, bytes).ok_or_else(truncated)
     }
 
+    /// Whether frames go through a picture of the opaque scene.
+    #[cfg(test)]
+    pub(crate) fn draws_scene_color(&self) -> bool {
+        self.renderer.draws_scene_color()
+    }
+
     /// The device it draws on.
     pub fn gpu(&self) -> &Gpu {
         &self.gpu

@@ -44,6 +44,7 @@ mod program;
 mod renderer;
 mod report;
 mod run;
+mod scene_color;
 mod scene_gpu;
 mod slot;
 mod target;

@@ -9,7 +9,6 @@ use kiln_link::{Revision, Target};
 use kiln_scene::{Effect, Material, variant_name};
 use kiln_shader::Reflection;
 
-use crate::binding::FrameBinding;
 use crate::draw_list::DrawList;
 use crate::keeper::{Keeper, Key};
 use crate::neutral;
@@ -41,7 +40,7 @@ pub(crate) struct Prepared {
     pub environment: Environment,
     pub scene: Option<Arc<GpuScene>>,
     pub draws: DrawList,
-    pub background: Option<(wgpu::RenderPipeline, FrameBinding)>,
+    pub background: Option<(wgpu::RenderPipeline, Arc<Program>)>,
     pub tonemap: Arc<Program>,
     pub tonemap_pipeline: wgpu::RenderPipeline,
     /// Whether a shader in use reads the time.
@@ -109,22 +108,19 @@ impl Preparer {
         let tonemap_pipeline = tonemap.pipeline(&self.gpu.device, Raster::FULL_SCREEN);
         let background = self.full_screen_program(revision, Role::Background, &mut report).map(|program| {
             let pipeline = program.pipeline(&self.gpu.device, Raster::FULL_SCREEN);
-            (pipeline, FrameBinding::new(&self.gpu, &program, &environment, None))
+            (pipeline, program)
         });
         let shader = meta.map_or_else(|| "pbr".to_owned(), |meta| meta.shader);
-        let draws =
-            scene.as_ref().map(|scene| self.draws(revision, scene, &shader, &environment, &mut report));
+        let draws = scene.as_ref().map(|scene| self.draws(revision, scene, &shader, &mut report));
         report.shown = Selection { scene: scene_name, env };
         // A scene's notes stand in its facts and in its GLB.
         let mut said = std::collections::BTreeSet::new();
         report.notes.retain(|note| said.insert(note.clone()));
         self.forget(revision, &report.shown);
         let draws = draws.unwrap_or_default();
-        let frames = background
-            .iter()
-            .map(|(_, frame)| frame)
-            .chain(draws.programs.iter().map(|program| &program.frame));
-        let is_animated = tonemap.reads_time() || frames.into_iter().any(FrameBinding::reads_time);
+        let of_draws = draws.programs.iter().map(|binding| &binding.program);
+        let of_background = background.iter().map(|(_, program)| program);
+        let is_animated = of_draws.chain(of_background).chain([&tonemap]).any(|program| program.reads_time());
         Some(Prepared {
             report,
             environment,
@@ -293,7 +289,6 @@ impl Preparer {
         revision: &Revision,
         scene: &GpuScene,
         shader: &str,
-        environment: &Environment,
         report: &mut ApplyReport,
     ) -> DrawList {
         let mut found: HashMap<String, Option<Arc<Program>>> = HashMap::new();
@@ -307,7 +302,7 @@ impl Preparer {
             }
             found[&name].clone()
         };
-        let (draws, fault) = gpu.catch_errors(|| DrawList::new(&gpu, scene, environment, &mut find));
+        let (draws, fault) = gpu.catch_errors(|| DrawList::new(&gpu, scene, &mut find));
         let faulty =
             |fault: String| Diagnostic::error("the scene cannot be bound to its shaders").with_note(fault);
         report.diagnostics.extend(fault.map(faulty));

@@ -179,6 +179,11 @@ impl Program {
         self.groups[0].iter().any(Bound::reads_time)
     }
 
+    /// Whether it reads what is drawn before it.
+    pub fn reads_scene_color(&self) -> bool {
+        self.groups[0].iter().any(|bound| bound.slot == Slot::SceneColor)
+    }
+
     fn create_pipeline(
         &self,
         device: &wgpu::Device,
@@ -342,7 +347,8 @@ fn check_binding(shader: &str, role: Role, binding: &Binding) -> Result<Slot, Di
                 "names that can be bound are listed in docs/shader-interface.md; your own stand in group 3",
             ));
     };
-    if [1, 2].contains(&slot.group()) && role != Role::Material {
+    let is_of_material = [1, 2].contains(&slot.group()) || slot == Slot::SceneColor;
+    if is_of_material && role != Role::Material {
         return Err(Diagnostic::error(format!("`{shader}` declares `{name}`, which only materials have")));
     }
     if slot == Slot::HdrColor && role != Role::Tonemap {
@@ -462,9 +468,12 @@ fn binding_type(bound: &Bound) -> wgpu::BindingType {
         Slot::EnvSkybox | Slot::EnvIrradiance | Slot::EnvSpecular | Slot::EnvSheen => {
             texture(wgpu::TextureViewDimension::Cube)
         }
-        Slot::LutGgx | Slot::LutCharlie | Slot::HdrColor | Slot::MaterialTexture(_) | Slot::OwnTexture => {
-            texture(wgpu::TextureViewDimension::D2)
-        }
+        Slot::LutGgx
+        | Slot::LutCharlie
+        | Slot::HdrColor
+        | Slot::SceneColor
+        | Slot::MaterialTexture(_)
+        | Slot::OwnTexture => texture(wgpu::TextureViewDimension::D2),
         Slot::EnvSampler | Slot::LutSampler | Slot::MaterialSampler(_) | Slot::OwnSampler => {
             wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)
         }

@@ -1,5 +1,6 @@
 //! Draws what was prepared into an offscreen picture.
 
+use std::cell::OnceCell;
 use std::cmp::Ordering;
 use std::sync::Arc;
 
@@ -10,7 +11,8 @@ use crate::binding::FrameBinding;
 use crate::camera::OrbitCamera;
 use crate::draw_list::{DrawItem, DrawList};
 use crate::prepare::Prepared;
-use crate::program::{DEPTH_FORMAT, HDR_FORMAT, OUTPUT_FORMAT, SAMPLE_COUNT};
+use crate::program::{DEPTH_FORMAT, HDR_FORMAT, OUTPUT_FORMAT, Program, SAMPLE_COUNT};
+use crate::scene_color::{Downsampler, SceneColor};
 use crate::scene_gpu::GpuScene;
 use crate::uniform::FrameValues;
 use crate::view::View;
@@ -20,8 +22,29 @@ use crate::view::View;
 pub(crate) struct Renderer {
     gpu: Gpu,
     picture: Picture,
-    shown: Option<Arc<Prepared>>,
-    tonemap: Option<FrameBinding>,
+    shown: Option<Shown>,
+    /// Made for the first scene that transmits light.
+    downsampler: OnceCell<Downsampler>,
+}
+
+/// What is shown, bound to the picture.
+#[derive(Debug)]
+struct Shown {
+    prepared: Arc<Prepared>,
+    background: Option<FrameBinding>,
+    /// Of each of the draw list's programs.
+    programs: Vec<FrameBinding>,
+    tonemap: FrameBinding,
+    /// If a program reads it.
+    scene_color: Option<SceneColor>,
+}
+
+/// How the scene is drawn: at once, or with a picture of what is opaque between.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    Whole,
+    Opaque,
+    Rest,
 }
 
 /// The images a frame goes through.
@@ -40,7 +63,8 @@ struct Picture {
 impl Renderer {
     /// A renderer that shows nothing yet. `size` is width and height in pixels.
     pub fn new(gpu: &Gpu, size: [u32; 2]) -> Self {
-        Renderer { gpu: gpu.clone(), picture: Picture::new(gpu, size), shown: None, tonemap: None }
+        let picture = Picture::new(gpu, size);
+        Renderer { gpu: gpu.clone(), picture, shown: None, downsampler: OnceCell::new() }
     }
 
     /// Changes the picture's size, limited to what the device takes; true if it changed.
@@ -50,19 +74,39 @@ impl Renderer {
             return false;
         }
         self.picture = Picture::new(&self.gpu, size);
-        self.bind_tonemap();
+        if let Some(shown) = self.shown.take() {
+            self.show(shown.prepared);
+        }
         true
     }
 
     /// Replaces what is shown.
     pub fn show(&mut self, prepared: Arc<Prepared>) {
-        self.shown = Some(prepared);
-        self.bind_tonemap();
+        let Prepared { draws, environment, .. } = &*prepared;
+        let scene_color = draws.reads_scene_color().then(|| {
+            let downsampler = self.downsampler.get_or_init(|| Downsampler::new(&self.gpu));
+            SceneColor::new(&self.gpu, downsampler, self.picture.size)
+        });
+        let bind = |program: &Program, picture| FrameBinding::new(&self.gpu, program, environment, picture);
+        let behind = scene_color.as_ref().map(|scene| &scene.view);
+        self.shown = Some(Shown {
+            background: prepared.background.as_ref().map(|(_, program)| bind(program, None)),
+            programs: draws.programs.iter().map(|binding| bind(&binding.program, behind)).collect(),
+            tonemap: bind(&prepared.tonemap, Some(&self.picture.hdr)),
+            scene_color,
+            prepared,
+        });
     }
 
     /// What is shown.
     pub fn shown(&self) -> Option<&Prepared> {
-        self.shown.as_deref()
+        self.shown.as_ref().map(|shown| &*shown.prepared)
+    }
+
+    /// Whether frames go through a picture of the opaque scene.
+    #[cfg(test)]
+    pub fn draws_scene_color(&self) -> bool {
+        self.shown.as_ref().is_some_and(|shown| shown.scene_color.is_some())
     }
 
     /// The finished picture: `Rgba8Unorm`, sRGB-encoded values.
@@ -82,31 +126,29 @@ impl Renderer {
 
     /// The camera that `view` asks for.
     pub fn camera(&self, view: &View) -> Option<OrbitCamera> {
-        let of_scene =
-            || Some(OrbitCamera::for_scene(&self.shown.as_ref()?.scene.as_ref()?.scene, self.aspect()));
+        let of_scene = || Some(OrbitCamera::for_scene(&self.shown()?.scene.as_ref()?.scene, self.aspect()));
         view.camera.or_else(of_scene)
     }
 
     /// Draws a frame and submits it; `None` if nothing was ever shown.
     pub fn render(&self, view: &View) -> Option<wgpu::SubmissionIndex> {
-        let (prepared, tonemap) = (self.shown.as_ref()?, self.tonemap.as_ref()?);
-        let values = self.frame_values(prepared, view);
-        let background = prepared.background.iter().map(|(_, frame)| frame);
-        let programs = prepared.draws.programs.iter().map(|program| &program.frame);
-        for frame in background.chain(programs).chain([tonemap]) {
+        let shown = self.shown.as_ref()?;
+        let values = self.frame_values(&shown.prepared, view);
+        for frame in shown.background.iter().chain(&shown.programs).chain([&shown.tonemap]) {
             frame.write(&self.gpu, &values, &view.parameters);
         }
         let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        self.draw_scene(&mut encoder, prepared, values.camera_position);
-        self.draw_tonemap(&mut encoder, prepared, tonemap);
+        let eye = values.camera_position;
+        match (&shown.scene_color, self.downsampler.get()) {
+            (Some(scene_color), Some(downsampler)) => {
+                self.draw_scene(&mut encoder, shown, Stage::Opaque, scene_color.base(), eye);
+                downsampler.run(&mut encoder, scene_color);
+                self.draw_scene(&mut encoder, shown, Stage::Rest, &self.picture.hdr, eye);
+            }
+            _ => self.draw_scene(&mut encoder, shown, Stage::Whole, &self.picture.hdr, eye),
+        }
+        self.draw_tonemap(&mut encoder, shown);
         Some(self.gpu.queue.submit([encoder.finish()]))
-    }
-
-    fn bind_tonemap(&mut self) {
-        let bind = |prepared: &Arc<Prepared>| {
-            FrameBinding::new(&self.gpu, &prepared.tonemap, &prepared.environment, Some(&self.picture.hdr))
-        };
-        self.tonemap = self.shown.as_ref().map(bind);
     }
 
     fn frame_values(&self, prepared: &Prepared, view: &View) -> FrameValues {
@@ -130,53 +172,56 @@ impl Renderer {
         }
     }
 
-    fn draw_scene(&self, encoder: &mut wgpu::CommandEncoder, prepared: &Prepared, eye: Vec3) {
+    fn draw_scene(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        shown: &Shown,
+        stage: Stage,
+        resolved: &wgpu::TextureView,
+        eye: Vec3,
+    ) {
+        // Without a background nothing else makes the picture opaque.
+        let empty = wgpu::Color {
+            a: if stage == Stage::Opaque && shown.background.is_some() { 0.0 } else { 1.0 },
+            ..wgpu::Color::BLACK
+        };
+        let store = if stage == Stage::Opaque { wgpu::StoreOp::Store } else { wgpu::StoreOp::Discard };
+        let color_load = if stage == Stage::Rest { wgpu::LoadOp::Load } else { wgpu::LoadOp::Clear(empty) };
+        let depth_load = if stage == Stage::Rest { wgpu::LoadOp::Load } else { wgpu::LoadOp::Clear(1.0) };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("scene"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
                 view: &self.picture.samples,
                 depth_slice: None,
-                resolve_target: Some(&self.picture.hdr),
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                    store: wgpu::StoreOp::Discard,
-                },
+                resolve_target: Some(resolved),
+                ops: wgpu::Operations { load: color_load, store },
             })],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                 view: &self.picture.depth,
-                depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(1.0),
-                    store: wgpu::StoreOp::Discard,
-                }),
+                depth_ops: Some(wgpu::Operations { load: depth_load, store }),
                 stencil_ops: None,
             }),
             ..Default::default()
         });
-        // Opaque draws from near to far, so that depth saves shading; blended ones from far to near.
-        let DrawList { opaque, blended, .. } = &prepared.draws;
-        self.draw_items(
-            &mut pass,
-            prepared,
-            sorted(opaque, |a, b| distance(a, eye).total_cmp(&distance(b, eye))),
-        );
-        self.draw_background(&mut pass, prepared);
-        self.draw_items(
-            &mut pass,
-            prepared,
-            sorted(blended, |a, b| distance(b, eye).total_cmp(&distance(a, eye))),
-        );
-    }
-
-    fn draw_items(&self, pass: &mut wgpu::RenderPass<'_>, prepared: &Prepared, items: Vec<&DrawItem>) {
-        let Some(scene) = &prepared.scene else { return };
-        for item in items {
-            draw_item(pass, scene, &prepared.draws, item);
+        // Opaque draws from near to far, so that depth saves shading; others from far to near.
+        let near_first = |items| sorted(items, |a, b| distance(a, eye).total_cmp(&distance(b, eye)));
+        let far_first = |items| sorted(items, |a, b| distance(b, eye).total_cmp(&distance(a, eye)));
+        let DrawList { opaque, transmissive, blended, .. } = &shown.prepared.draws;
+        if stage != Stage::Rest {
+            draw_items(&mut pass, shown, near_first(opaque));
+        }
+        if stage != Stage::Opaque {
+            self.draw_background(&mut pass, shown);
+            draw_items(&mut pass, shown, far_first(transmissive));
+            draw_items(&mut pass, shown, far_first(blended));
         }
     }
 
     /// Fills what is still open. The viewport puts it on the far plane, at whatever depth its author chose.
-    fn draw_background(&self, pass: &mut wgpu::RenderPass<'_>, prepared: &Prepared) {
-        let Some((pipeline, frame)) = &prepared.background else { return };
+    fn draw_background(&self, pass: &mut wgpu::RenderPass<'_>, shown: &Shown) {
+        let (Some((pipeline, _)), Some(frame)) = (&shown.prepared.background, &shown.background) else {
+            return;
+        };
         let [width, height] = self.picture.size.map(|pixels| pixels as f32);
         pass.set_viewport(0.0, 0.0, width, height, 1.0, 1.0);
         pass.set_pipeline(pipeline);
@@ -185,7 +230,7 @@ impl Renderer {
         pass.set_viewport(0.0, 0.0, width, height, 0.0, 1.0);
     }
 
-    fn draw_tonemap(&self, encoder: &mut wgpu::CommandEncoder, prepared: &Prepared, frame: &FrameBinding) {
+    fn draw_tonemap(&self, encoder: &mut wgpu::CommandEncoder, shown: &Shown) {
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("tonemap"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
@@ -196,8 +241,8 @@ impl Renderer {
             })],
             ..Default::default()
         });
-        pass.set_pipeline(&prepared.tonemap_pipeline);
-        frame.set(&mut pass);
+        pass.set_pipeline(&shown.prepared.tonemap_pipeline);
+        shown.tonemap.set(&mut pass);
         pass.draw(0..3, 0..1);
     }
 }
@@ -213,11 +258,18 @@ fn sorted(items: &[DrawItem], order: impl Fn(&DrawItem, &DrawItem) -> Ordering) 
     items
 }
 
-fn draw_item(pass: &mut wgpu::RenderPass<'_>, scene: &GpuScene, draws: &DrawList, item: &DrawItem) {
-    let program = &draws.programs[item.program];
+fn draw_items(pass: &mut wgpu::RenderPass<'_>, shown: &Shown, items: Vec<&DrawItem>) {
+    let Some(scene) = &shown.prepared.scene else { return };
+    for item in items {
+        draw_item(pass, scene, shown, item);
+    }
+}
+
+fn draw_item(pass: &mut wgpu::RenderPass<'_>, scene: &GpuScene, shown: &Shown, item: &DrawItem) {
+    let program = &shown.prepared.draws.programs[item.program];
     let mesh = &scene.meshes[item.mesh];
     pass.set_pipeline(&item.pipeline);
-    program.frame.set(pass);
+    shown.programs[item.program].set(pass);
     if let Some(group) = &item.material_group {
         pass.set_bind_group(1, group, &[]);
     }

@@ -111,6 +111,7 @@ pub(crate) enum Slot {
     LutGgx,
     LutCharlie,
     HdrColor,
+    SceneColor,
     EnvSampler,
     LutSampler,
     Material,
@@ -125,7 +126,7 @@ pub(crate) enum Slot {
     OwnSampler,
 }
 
-const FIXED: [(Slot, &str); 13] = [
+const FIXED: [(Slot, &str); 14] = [
     (Slot::Frame, "frame"),
     (Slot::EnvSkybox, "env_skybox"),
     (Slot::EnvIrradiance, "env_irradiance"),
@@ -134,6 +135,7 @@ const FIXED: [(Slot, &str); 13] = [
     (Slot::LutGgx, "lut_ggx"),
     (Slot::LutCharlie, "lut_charlie"),
     (Slot::HdrColor, "hdr_color"),
+    (Slot::SceneColor, "scene_color"),
     (Slot::EnvSampler, "env_sampler"),
     (Slot::LutSampler, "lut_sampler"),
     (Slot::Material, "material"),
@@ -193,6 +195,7 @@ impl Slot {
             Slot::LutGgx
             | Slot::LutCharlie
             | Slot::HdrColor
+            | Slot::SceneColor
             | Slot::MaterialTexture(_)
             | Slot::OwnTexture => "texture_2d<f32>",
             Slot::EnvSampler | Slot::LutSampler | Slot::MaterialSampler(_) | Slot::OwnSampler => "sampler",

@@ -179,6 +179,8 @@ pub struct Sphere {
     pub texels: Vec<[u8; 4]>,
     /// Of its node; none is 1.
     pub scale: Option<[f32; 3]>,
+    /// More spheres: material, middle, radius.
+    pub others: Vec<(Value, [f32; 3], f32)>,
 }
 
 impl Sphere {
@@ -218,13 +220,22 @@ impl Sphere {
         let count = positions.len() / 3;
         let texture = |at| json!({ "source": at });
         let image = |at| json!({ "bufferView": columns.len() + at, "mimeType": "image/png" });
+        let mesh = |material: usize| {
+            let attributes = json!({ "POSITION": 0, "NORMAL": 0, "TANGENT": 2 });
+            json!({ "primitives": [{ "attributes": attributes, "indices": 1, "material": material }] })
+        };
+        let mut nodes = vec![json!({ "mesh": 0, "scale": self.scale.unwrap_or([1.0; 3]) })];
+        for (at, (_, middle, radius)) in self.others.iter().enumerate() {
+            nodes.push(json!({ "mesh": at + 1, "translation": middle, "scale": [radius, radius, radius] }));
+        }
+        let materials: Vec<&Value> =
+            [&self.material].into_iter().chain(self.others.iter().map(|(material, ..)| material)).collect();
         let document = json!({
-            "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }],
-            "nodes": [{ "mesh": 0, "scale": self.scale.unwrap_or([1.0; 3]) }],
-            "meshes": [{ "primitives": [{
-                "attributes": { "POSITION": 0, "NORMAL": 0, "TANGENT": 2 }, "indices": 1, "material": 0
-            }] }],
-            "materials": [self.material],
+            "asset": { "version": "2.0" }, "scene": 0,
+            "scenes": [{ "nodes": (0..nodes.len()).collect::<Vec<_>>() }],
+            "nodes": nodes,
+            "meshes": (0..materials.len()).map(mesh).collect::<Vec<_>>(),
+            "materials": materials,
             "textures": (0..images.len()).map(texture).collect::<Vec<_>>(),
             "images": (0..images.len()).map(image).collect::<Vec<_>>(),
             "buffers": [{ "byteLength": binary.len() }],

@@ -8,4 +8,5 @@ mod frames;
 mod panels;
 mod parameters;
 mod pure;
+mod transmission;
 mod wire;

@@ -172,6 +172,11 @@ fn passes(plan: &Plan) -> Vec<(&'static str, String, bool)> {
     let has = |effect: Effect| move |material: &MaterialEffects| material.effects.contains(&effect);
     vec![
         pass("pass opaque", &|material| !has(Effect::AlphaBlend)(material), "every material is blended"),
+        pass(
+            "picture of the opaque scene for what shines through",
+            &|material| has(Effect::Transmission)(material) && !has(Effect::Unlit)(material),
+            "no material transmits light",
+        ),
         pass("pass blended, sorted by depth", &has(Effect::AlphaBlend), "no material is transparent"),
         pass(
             "tangents",
