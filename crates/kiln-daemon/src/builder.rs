@@ -1,12 +1,13 @@
 //! The thread that builds: one batch at a time, cancelled by the next.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
 
-use kiln_build::{ActionId, Engine, Error, Outcome, RunOptions, Status};
-use kiln_link::{ActionTime, ProgressReport, RevisionTable, Server, Work};
+use kiln_build::{ActionId, Digest, Engine, Error, Outcome, RunOptions, Status};
+use kiln_link::{ActionTime, ProgressReport, Revision, RevisionTable, Server, Work};
 use kiln_project::{Built, build, write_outputs};
 
 use crate::watch::Batch;
@@ -185,6 +186,21 @@ impl BuilderThread {
             Err(Error::Action { action: "build".to_owned(), reason })
         })
     }
+}
+
+/// What a build made as a client would get it: for pictures without a daemon.
+///
+/// # Errors
+/// [`Error::Lost`] if the store no longer has a content of it.
+pub fn to_revision(engine: &Engine, built: Built) -> Result<Revision, Error> {
+    let lost = |digest: Digest| Error::Lost { what: format!("blob {}", digest.short()) };
+    let table = RevisionTable { number: 1, ..to_table(built, Batch::default()) };
+    let mut blobs = HashMap::new();
+    for part in table.targets.values().flat_map(|target| &target.parts) {
+        let bytes = engine.store().get(&part.digest).ok_or_else(|| lost(part.digest))?;
+        blobs.insert(part.digest, bytes);
+    }
+    Revision::new(table, blobs).map_err(lost)
 }
 
 fn to_table(built: Built, batch: Batch) -> RevisionTable {

@@ -9,7 +9,7 @@
 //!
 //! Not here: what is built (`kiln-project`), how it travels (`kiln-link`), what is printed (`kiln`).
 
-pub use builder::to_work;
+pub use builder::{to_revision, to_work};
 pub use daemon::{Daemon, DaemonError, DaemonOptions, Notice, StopHandle};
 
 mod builder;

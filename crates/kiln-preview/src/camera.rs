@@ -47,6 +47,13 @@ impl OrbitCamera {
         of_file.unwrap_or_else(|| Self::framing(bounds, aspect))
     }
 
+    /// The perspective cameras of the file by name, as they stand at rest; their roll is not kept.
+    pub fn of_scene(scene: &Scene) -> Vec<(String, OrbitCamera)> {
+        let bounds = scene.bounds.unwrap_or(Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE });
+        let named = |camera: &Camera| Some((camera.name.clone(), Self::from_file(camera, bounds)?));
+        scene.cameras.iter().filter_map(named).collect()
+    }
+
     fn from_file(camera: &Camera, bounds: Bounds) -> Option<Self> {
         let field_of_view_rad = camera.yfov_rad.filter(|angle| (0.01..3.1).contains(angle))?;
         let eye = camera.world.w_axis.truncate();

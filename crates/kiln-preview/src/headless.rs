@@ -2,11 +2,14 @@
 
 use std::sync::Arc;
 
+use half::f16;
 use image::RgbaImage;
 use kiln_gpu::{Gpu, GpuError};
+use kiln_image::Image;
 use kiln_link::Revision;
 
 use crate::assignment::{Assignment, RefusedParameter};
+use crate::camera::OrbitCamera;
 use crate::prepare::Preparer;
 use crate::renderer::Renderer;
 use crate::report::ApplyReport;
@@ -104,6 +107,27 @@ impl HeadlessViewer {
         let bytes = self.gpu.read_texture(output, 0)?;
         let truncated = || GpuError::Readback { reason: "the picture is incomplete".to_owned() };
         RgbaImage::from_raw(width, height, bytes).ok_or_else(truncated)
+    }
+
+    /// Draws a frame and reads its radiance, before exposure and tone mapping: linear Rec. 709, alpha left out.
+    ///
+    /// # Errors
+    /// [`GpuError::Readback`] when the device is lost.
+    pub fn render_radiance(&mut self) -> Result<Image, GpuError> {
+        self.renderer.render(&self.view);
+        let radiance = self.renderer.radiance();
+        let size = [radiance.width(), radiance.height()].map(|pixels| pixels as usize);
+        let bytes = self.gpu.read_texture(radiance, 0)?;
+        let channel = |half: &[u8]| f16::from_le_bytes([half[0], half[1]]).to_f32();
+        let rgb = bytes.chunks_exact(8).flat_map(|texel| texel[..6].chunks_exact(2).map(channel)).collect();
+        let incomplete = |_| GpuError::Readback { reason: "the picture is incomplete".to_owned() };
+        Image::new(size[0], size[1], rgb).map_err(incomplete)
+    }
+
+    /// The cameras of the scene that is shown, by name.
+    pub fn cameras(&self) -> Vec<(String, OrbitCamera)> {
+        let scene = self.renderer.shown().and_then(|prepared| prepared.scene.as_ref());
+        scene.map_or_else(Vec::new, |scene| OrbitCamera::of_scene(&scene.scene))
     }
 
     /// Whether frames go through a picture of the opaque scene.

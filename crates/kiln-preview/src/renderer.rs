@@ -54,6 +54,7 @@ struct Picture {
     /// Linear radiance, several samples a pixel.
     samples: wgpu::TextureView,
     /// Linear radiance.
+    radiance: wgpu::Texture,
     hdr: wgpu::TextureView,
     depth: wgpu::TextureView,
     output: wgpu::Texture,
@@ -112,6 +113,11 @@ impl Renderer {
     /// The finished picture: `Rgba8Unorm`, sRGB-encoded values.
     pub fn output(&self) -> &wgpu::Texture {
         &self.picture.output
+    }
+
+    /// The picture before exposure and tone mapping: `Rgba16Float`, linear.
+    pub fn radiance(&self) -> &wgpu::Texture {
+        &self.picture.radiance
     }
 
     /// The same as a view.
@@ -304,10 +310,12 @@ impl Picture {
         };
         let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
         let output = create("output", OUTPUT_FORMAT, 1, read | wgpu::TextureUsages::COPY_SRC);
+        let radiance = create("hdr", HDR_FORMAT, 1, read | wgpu::TextureUsages::COPY_SRC);
         Picture {
             size,
             samples: view(&create("samples", HDR_FORMAT, SAMPLE_COUNT, attachment)),
-            hdr: view(&create("hdr", HDR_FORMAT, 1, read)),
+            hdr: view(&radiance),
+            radiance,
             depth: view(&create("depth", DEPTH_FORMAT, SAMPLE_COUNT, attachment)),
             output_view: view(&output),
             output,

@@ -87,10 +87,6 @@ pub(crate) fn material_notes(name: &str, material: &Material) -> Vec<String> {
         return Vec::new();
     }
     let asked = [
-        (
-            ext.transmission.as_ref().is_some_and(|it| it.transmission_factor > 0.0),
-            "transmission is approximated: only the environment shows through",
-        ),
         (ext.specular_glossiness.is_some(), "specular-glossiness was converted to metallic-roughness"),
     ];
     let asked = asked.into_iter().filter(|(is_asked, _)| *is_asked);

@@ -55,6 +55,9 @@ pub(crate) enum Command {
     /// Show what a watching kiln publishes, in a window or as PNG files
     #[cfg(feature = "preview")]
     Preview(PreviewArgs),
+    /// Build a project and draw it into PNG or EXR files: no daemon, no window, the pixels of the preview
+    #[cfg(feature = "preview")]
+    Render(RenderArgs),
     /// Make a sample project, bake it, show it, and edit it before your eyes
     Demo(DemoArgs),
 }
@@ -402,6 +405,57 @@ pub(crate) struct PreviewArgs {
     /// Print JSON instead of text
     #[arg(long, requires = "headless")]
     pub(crate) json: bool,
+}
+
+#[cfg(feature = "preview")]
+#[derive(Debug, ClapArgs)]
+#[command(after_help = "\
+Examples:
+  kiln render look                                          the first scene under its own light
+  kiln render look --scene all --env all --sheet sheet.png  every scene under every light, on one picture too
+  kiln render look --vary tone_mapper --sheet curves.png    one picture for each choice of a shader's parameter
+  kiln render look --camera Front --frames 36 --turn 10 --exr
+
+Exit codes: 0 drawn, 1 something in the project is wrong (what can be drawn is), 2 the tool failed.")]
+pub(crate) struct RenderArgs {
+    #[command(flatten)]
+    pub(crate) build: BuildArgs,
+    /// Scene to draw, may be given more than once; `all` draws every one [default: the project's first]
+    #[arg(long)]
+    pub(crate) scene: Vec<String>,
+    /// Environment to draw it in, may be given more than once; `all` takes every one [default: the scene's own]
+    #[arg(long)]
+    pub(crate) env: Vec<String>,
+    /// Camera of the glTF file to draw through [default: its first, else one that shows the whole scene]
+    #[arg(long)]
+    pub(crate) camera: Option<String>,
+    /// Picture size in pixels
+    #[arg(long, default_value = "1280x720", value_parser = parse_size)]
+    pub(crate) size: [u32; 2],
+    /// Number of frames of each
+    #[arg(long, default_value_t = 1)]
+    pub(crate) frames: usize,
+    /// Turn the environment by this much from frame to frame, in degrees
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    pub(crate) turn: f32,
+    /// Exposure in stops
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    pub(crate) exposure: f32,
+    /// Set a parameter that a shader's author offers: wetness=0.5, tonemap.tint=1,0.9,0.8, tone_mapper=agx
+    #[arg(long, value_name = "[SHADER.]NAME=VALUE")]
+    pub(crate) param: Vec<kiln_preview::Assignment>,
+    /// Draw one picture for each choice of this parameter
+    #[arg(long, value_name = "[SHADER.]NAME")]
+    pub(crate) vary: Option<String>,
+    /// Folder for SCENE-ENV.png …
+    #[arg(long, default_value = "frames")]
+    pub(crate) out: PathBuf,
+    /// Write the radiance before exposure and tone mapping besides, as OpenEXR
+    #[arg(long)]
+    pub(crate) exr: bool,
+    /// Lay all pictures out on one, a row for each scene under each light
+    #[arg(long, value_name = "FILE.png")]
+    pub(crate) sheet: Option<PathBuf>,
 }
 
 #[derive(Debug, ClapArgs)]

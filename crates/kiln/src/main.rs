@@ -59,6 +59,8 @@ fn main() -> ExitCode {
         args::Command::Watch(args) => commands::watch::run(&args),
         #[cfg(feature = "preview")]
         args::Command::Preview(args) => commands::preview::run(&args),
+        #[cfg(feature = "preview")]
+        args::Command::Render(args) => commands::render::run(&args),
         args::Command::Demo(args) => commands::demo::run(&args),
     };
     result.unwrap_or_else(|error| {

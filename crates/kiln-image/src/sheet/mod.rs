@@ -36,6 +36,37 @@ pub struct Tile {
     pub picture: Picture,
 }
 
+/// A finished picture with its title.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Shot {
+    /// As of a [`Tile`].
+    pub title: String,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// sRGB, `width · height · 3` bytes.
+    pub rgb: Vec<u8>,
+}
+
+/// Lays finished pictures out in rows of `columns`, pixel by pixel, as width, height and sRGB bytes. Cells are as wide as the
+/// widest picture.
+pub fn shot_sheet(shots: &[Shot], columns: usize) -> (usize, usize, Vec<u8>) {
+    let cell = shots.iter().map(|shot| shot.width).max().unwrap_or(0).max(64);
+    let heights = shots.iter().map(|shot| shot.height).collect();
+    let grid = Grid::new(cell, heights, columns.clamp(1, shots.len().max(1)));
+    let mut canvas = Canvas::new(grid.width(), grid.height());
+    for (index, shot) in shots.iter().enumerate() {
+        let (x, y) = grid.place(index);
+        canvas.title(x, y, &shot.title, &grid);
+        for (offset, pixel) in shot.rgb.chunks_exact(3).enumerate() {
+            let position = (x + offset % shot.width, y + grid.title_height() + offset / shot.width);
+            canvas.set(position, [pixel[0], pixel[1], pixel[2]]);
+        }
+    }
+    (canvas.width, canvas.height, canvas.rgb)
+}
+
 /// Lays tiles out in a grid, `tile_width` pixels each (at least 64), as width, height and sRGB bytes.
 ///
 /// Small maps are enlarged texel by texel, large ones averaged in linear light before tone mapping
@@ -44,13 +75,14 @@ pub fn contact_sheet(tiles: &[Tile], tile_width: usize) -> (usize, usize, Vec<u8
     let tile_width = tile_width.max(64) / 4 * 4;
     let drawn: Vec<Drawn> = tiles.iter().map(|tile| draw(&tile.picture, tile_width)).collect();
     let exposure = exposure(drawn.iter().flat_map(|picture| picture.pixels.iter().flatten().copied()));
-    let grid = Grid::new(tile_width, drawn.iter().map(|picture| picture.height).collect());
+    // As many columns as make the sheet a little wider than high: tiles are wider than high already.
+    let columns = (1..).find(|columns| columns * columns >= drawn.len()).unwrap_or(1).max(1);
+    let columns = columns.min(drawn.len().max(1));
+    let grid = Grid::new(tile_width, drawn.iter().map(|picture| picture.height).collect(), columns);
     let mut canvas = Canvas::new(grid.width(), grid.height());
     for (index, (tile, picture)) in tiles.iter().zip(&drawn).enumerate() {
         let (x, y) = grid.place(index);
-        let columns = tile_width / (font::ADVANCE * grid.text_scale);
-        let title: String = tile.title.chars().take(columns).collect();
-        canvas.text(x, y, &title, grid.text_scale);
+        canvas.title(x, y, &tile.title, &grid);
         for (offset, pixel) in picture.pixels.iter().enumerate() {
             if let Some(rgb) = pixel {
                 let position = (x + offset % tile_width, y + grid.title_height() + offset / tile_width);
@@ -115,16 +147,9 @@ struct Grid {
 }
 
 impl Grid {
-    fn new(tile_width: usize, heights: Vec<usize>) -> Grid {
-        // As many columns as make the sheet a little wider than high: tiles are wider than high already.
-        let columns = (1..).find(|columns| columns * columns >= heights.len()).unwrap_or(1).max(1);
+    fn new(tile_width: usize, heights: Vec<usize>, columns: usize) -> Grid {
         let rows = heights.chunks(columns).map(|row| row.iter().copied().max().unwrap_or(0)).collect();
-        Grid {
-            tile_width,
-            columns: columns.min(heights.len().max(1)),
-            text_scale: (tile_width / 200).max(1),
-            rows,
-        }
+        Grid { tile_width, columns, text_scale: (tile_width / 200).max(1), rows }
     }
 
     fn gap(&self) -> usize {
@@ -168,6 +193,12 @@ impl Canvas {
     fn set(&mut self, (x, y): (usize, usize), rgb: [u8; 3]) {
         let start = (y * self.width + x) * 3;
         self.rgb[start..start + 3].copy_from_slice(&rgb);
+    }
+
+    fn title(&mut self, x: usize, y: usize, title: &str, grid: &Grid) {
+        let columns = grid.tile_width / (font::ADVANCE * grid.text_scale);
+        let title: String = title.chars().take(columns).collect();
+        self.text(x, y, &title, grid.text_scale);
     }
 
     fn text(&mut self, x: usize, y: usize, text: &str, scale: usize) {

@@ -13,6 +13,8 @@ pub(crate) mod init;
 pub(crate) mod plan;
 #[cfg(feature = "preview")]
 pub(crate) mod preview;
+#[cfg(feature = "preview")]
+pub(crate) mod render;
 pub(crate) mod shader;
 pub(crate) mod verify;
 pub(crate) mod watch;

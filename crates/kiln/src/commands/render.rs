@@ -1,0 +1,251 @@
+//! `kiln render`: builds a project and draws it, without a daemon or a window.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use anyhow::{Context as _, ensure};
+use kiln_diagnostic::{Diagnostic, has_errors};
+use kiln_gpu::Gpu;
+use kiln_image::sheet::{Shot, shot_sheet};
+use kiln_link::Revision;
+use kiln_preview::{ApplyReport, Assignment, HeadlessViewer, Selection};
+use kiln_shader::Widget;
+use serde::Serialize;
+
+use crate::args::RenderArgs;
+use crate::commands::bake::{progress_bar, show_progress};
+use crate::out::say;
+use crate::{INPUT_IS_WRONG, place, report};
+
+/// Stands for every scene or environment of the project.
+const ALL: &str = "all";
+
+pub(crate) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
+    let revision = build(args)?;
+    let gpu = Gpu::headless().context("opening a graphics device")?;
+    let mut session = Session::new(args, HeadlessViewer::new(gpu, args.size), &revision)?;
+    for scene in chosen(&args.scene, &session.offered.scenes, "scene")? {
+        for env in chosen(&args.env, &session.offered.envs, "environment")? {
+            session.draw_selection(&revision, Selection { scene: scene.clone(), env })?;
+        }
+    }
+    session.finish(&revision)
+}
+
+fn build(args: &RenderArgs) -> anyhow::Result<Revision> {
+    let engine = place::open_engine(&args.build.dir)?;
+    let _hold = engine.store().hold();
+    let bar = progress_bar();
+    let progress = show_progress(&bar);
+    let cancel = AtomicBool::new(false);
+    let options = place::run_options(&args.build, true, &cancel, &progress);
+    let built = kiln_project::build(&engine, None, &options);
+    bar.finish_and_clear();
+    let built = built.context("building")?.context("the build was cancelled")?;
+    engine.save_memory().context("remembering the build")?;
+    kiln_daemon::to_revision(&engine, built).context("reading what was built")
+}
+
+/// What was asked for by name, each checked; the project's own choice where nothing was.
+fn chosen(asked: &[String], offered: &[String], what: &str) -> anyhow::Result<Vec<Option<String>>> {
+    if asked.is_empty() {
+        return Ok(vec![None]);
+    }
+    if asked.iter().any(|name| name == ALL) {
+        return Ok(offered.iter().cloned().map(Some).collect());
+    }
+    let check = |name: &String| {
+        if offered.contains(name) {
+            return Ok(Some(name.clone()));
+        }
+        let known = offered.join(", ");
+        Err(place::WrongInput(format!("the project has no {what} `{name}`\n  help: it has {known}")).into())
+    };
+    asked.iter().map(check).collect()
+}
+
+/// A picture and how it came about.
+#[derive(Debug, Serialize)]
+struct Drawn {
+    file: PathBuf,
+    scene: Option<String>,
+    env: Option<String>,
+    /// Choice of the varied parameter.
+    choice: Option<String>,
+    frame: usize,
+    /// Without reading it back.
+    draw_ms: f64,
+}
+
+/// Everything about one run.
+#[derive(Debug, Serialize)]
+struct Facts<'a> {
+    adapter: String,
+    pictures: &'a [Drawn],
+    sheet: Option<&'a Path>,
+    notes: Vec<String>,
+    diagnostics: &'a [Diagnostic],
+}
+
+struct Session<'a> {
+    args: &'a RenderArgs,
+    viewer: HeadlessViewer,
+    offered: ApplyReport,
+    drawn: Vec<Drawn>,
+    shots: Vec<Shot>,
+    notes: Vec<String>,
+    diagnostics: Vec<Diagnostic>,
+}
+
+impl<'a> Session<'a> {
+    fn new(args: &'a RenderArgs, mut viewer: HeadlessViewer, revision: &Revision) -> anyhow::Result<Self> {
+        std::fs::create_dir_all(&args.out)
+            .with_context(|| format!("making the folder {}", args.out.display()))?;
+        viewer.view.exposure_ev = args.exposure;
+        let offered = viewer.apply(revision);
+        let diagnostics = revision.table.diagnostics.clone();
+        Ok(Session { args, viewer, offered, drawn: vec![], shots: vec![], notes: vec![], diagnostics })
+    }
+
+    fn draw_selection(&mut self, revision: &Revision, selection: Selection) -> anyhow::Result<()> {
+        let mut applied = self.viewer.select(selection);
+        if !self.args.param.is_empty() {
+            applied = self.viewer.assign(&self.args.param).map_err(|it| place::WrongInput(it.to_string()))?;
+        }
+        if applied.shown.scene.is_none() {
+            let number = revision.table.number;
+            let reason = format!("the project has no scene that can be shown (revision {number})");
+            return Err(place::WrongInput(reason).into());
+        }
+        self.notes.extend(
+            applied.notes.iter().filter(|note| !self.notes.contains(note)).cloned().collect::<Vec<_>>(),
+        );
+        self.diagnostics.extend(applied.diagnostics.iter().cloned());
+        self.viewer.view.camera = match &self.args.camera {
+            Some(name) => Some(self.camera(name)?),
+            None => None,
+        };
+        match &self.args.vary {
+            None => self.draw_frames(&applied, None),
+            Some(name) => {
+                for choice in choices(name, &applied)? {
+                    let text = format!("{name}={choice}");
+                    let assignment: Assignment = text.parse().map_err(place::WrongInput)?;
+                    self.viewer.assign(&[assignment]).map_err(|it| place::WrongInput(it.to_string()))?;
+                    self.draw_frames(&applied, Some(&choice))?;
+                }
+                Ok(())
+            }
+        }
+    }
+
+    fn camera(&self, name: &str) -> anyhow::Result<kiln_preview::OrbitCamera> {
+        let cameras = self.viewer.cameras();
+        let found = cameras.iter().find(|(known, _)| known == name).map(|(_, camera)| *camera);
+        found.ok_or_else(|| {
+            let known: Vec<&str> = cameras.iter().map(|(name, _)| name.as_str()).collect();
+            let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+            place::WrongInput(format!("the scene has no camera `{name}`\n  help: it has {known}")).into()
+        })
+    }
+
+    fn draw_frames(&mut self, applied: &ApplyReport, choice: Option<&str>) -> anyhow::Result<()> {
+        let turned = self.viewer.view.environment_rotation_rad;
+        for frame in 1..=self.args.frames {
+            self.draw_frame(applied, choice, frame)?;
+            self.viewer.view.environment_rotation_rad += self.args.turn.to_radians();
+        }
+        self.viewer.view.environment_rotation_rad = turned;
+        Ok(())
+    }
+
+    fn draw_frame(
+        &mut self,
+        applied: &ApplyReport,
+        choice: Option<&str>,
+        frame: usize,
+    ) -> anyhow::Result<()> {
+        let start = Instant::now();
+        self.viewer.draw().context("drawing a frame")?;
+        let draw_ms = start.elapsed().as_secs_f64() * 1e3;
+        let picture = self.viewer.render().context("reading a frame")?;
+        let shown = &applied.shown;
+        let words = [shown.scene.as_deref(), shown.env.as_deref(), choice];
+        let title = words.into_iter().flatten().collect::<Vec<_>>();
+        let number = if self.args.frames > 1 { format!("_{frame:04}") } else { String::new() };
+        let stem = format!("{}{number}", title.join("-").replace(['/', '\\'], "-"));
+        let file = self.args.out.join(format!("{stem}.png"));
+        picture.save(&file).with_context(|| format!("writing {}", file.display()))?;
+        if self.args.exr {
+            let radiance = self.viewer.render_radiance().context("reading a frame")?;
+            let bytes = kiln_image::exr_write::encode_image(&radiance, kiln_image::Cancel::NEVER)?;
+            kiln_build::write_atomically(&kiln_build::Disk, &file.with_extension("exr"), &bytes)
+                .context("writing the radiance")?;
+        }
+        if self.args.sheet.is_some() {
+            let rgb = picture.pixels().flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+            let [width, height] = [picture.width(), picture.height()].map(|pixels| pixels as usize);
+            self.shots.push(Shot { title: title.join(", ") + &number, width, height, rgb });
+        }
+        let (scene, env) = (shown.scene.clone(), shown.env.clone());
+        let choice = choice.map(str::to_owned);
+        self.drawn.push(Drawn { file, scene, env, choice, frame, draw_ms });
+        Ok(())
+    }
+
+    fn finish(self, revision: &Revision) -> anyhow::Result<ExitCode> {
+        let errors = self.viewer.gpu().take_errors();
+        ensure!(errors.is_empty(), "the graphics device reported: {}", errors.join("; "));
+        if let Some(path) = &self.args.sheet {
+            // A row for each scene under each light.
+            let rows = self.drawn.iter().map(|drawn| (&drawn.scene, &drawn.env));
+            let rows = rows.collect::<std::collections::BTreeSet<_>>().len().max(1);
+            let (width, height, rgb) = shot_sheet(&self.shots, (self.shots.len() / rows).clamp(1, 8));
+            let png = kiln_image::png::encode_rgb8(width, height, &rgb);
+            kiln_build::write_atomically(&kiln_build::Disk, path, &png).context("writing the sheet")?;
+        }
+        let facts = Facts {
+            adapter: self.viewer.gpu().description(),
+            pictures: &self.drawn,
+            sheet: self.args.sheet.as_deref(),
+            notes: self.notes,
+            diagnostics: &self.diagnostics,
+        };
+        if self.args.build.json {
+            say!("{}", serde_json::to_string_pretty(&facts)?);
+        } else {
+            report::print_diagnostics(facts.diagnostics, false);
+            facts.notes.iter().for_each(|note| say!("note: {note}"));
+            say!("{} on {}", report::revision_line(&revision.table), facts.adapter);
+            for drawn in facts.pictures {
+                say!("{}  ({})", drawn.file.display(), report::duration(drawn.draw_ms));
+            }
+            if let Some(sheet) = facts.sheet {
+                say!("{}", sheet.display());
+            }
+        }
+        Ok(if has_errors(facts.diagnostics) { ExitCode::from(INPUT_IS_WRONG) } else { ExitCode::SUCCESS })
+    }
+}
+
+/// The names that a parameter with a list offers.
+fn choices(name: &str, applied: &ApplyReport) -> anyhow::Result<Vec<String>> {
+    let is_it = |offered: &str, full: &str| offered == name || full == name;
+    let found = applied.parameters.iter().find(|offered| is_it(&offered.name, &offered.full_name()));
+    match found.map(|offered| &offered.widget) {
+        Some(Widget::Choice { names }) => Ok(names.clone()),
+        Some(_) => Err(place::WrongInput(format!(
+            "`{name}` has no list of choices to vary\n  help: `--param {name}=VALUE` sets it"
+        ))
+        .into()),
+        None => {
+            let lists = applied.parameters.iter().filter(|it| matches!(it.widget, Widget::Choice { .. }));
+            let known: Vec<String> = lists.map(|offered| offered.full_name()).collect();
+            let help = if known.is_empty() { "none has a list".to_owned() } else { known.join(", ") };
+            Err(place::WrongInput(format!("no shader in use offers `{name}`\n  help: to vary: {help}"))
+                .into())
+        }
+    }
+}
