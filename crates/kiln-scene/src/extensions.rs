@@ -86,9 +86,8 @@ pub(crate) fn material_notes(name: &str, material: &Material) -> Vec<String> {
     if ext.unlit.is_some() {
         return Vec::new();
     }
-    let asked = [
-        (ext.specular_glossiness.is_some(), "specular-glossiness was converted to metallic-roughness"),
-    ];
+    let asked =
+        [(ext.specular_glossiness.is_some(), "specular-glossiness was converted to metallic-roughness")];
     let asked = asked.into_iter().filter(|(is_asked, _)| *is_asked);
     asked.map(|(_, what)| format!("material `{name}`: {what}")).collect()
 }
