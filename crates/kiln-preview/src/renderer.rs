@@ -143,10 +143,8 @@ impl Renderer {
         for frame in shown.background.iter().chain(&shown.programs).chain([&shown.tonemap]) {
             frame.write(&self.gpu, &values, &view.parameters);
         }
-        if let Some(scene) = prepared.scene.as_ref().map(|scene| &scene.scene) {
-            for program in &prepared.draws.programs {
-                program.frame.write_lights(&self.gpu, scene, &scene.lights);
-            }
+        if let Some(scene) = shown.prepared.scene.as_ref().map(|scene| &scene.scene) {
+            shown.programs.iter().for_each(|frame| frame.write_lights(&self.gpu, scene, &scene.lights));
         }
         let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let eye = values.camera_position;

@@ -128,7 +128,7 @@ pub(crate) enum Slot {
     OwnSampler,
 }
 
-const FIXED: [(Slot, &str); 14] = [
+const FIXED: [(Slot, &str); 15] = [
     (Slot::Frame, "frame"),
     (Slot::EnvSkybox, "env_skybox"),
     (Slot::EnvIrradiance, "env_irradiance"),
