@@ -22,7 +22,8 @@ const INVERSE_RANGE_SQUARED_MAX: f64 = 1e12;
 /// # Errors
 /// What a shader must declare instead.
 pub(crate) fn capacity(members: &[Member]) -> Result<usize, &'static str> {
-    let expected = "a struct of `count: u32` and `items: array<PunctualLight, N>`, see docs/shader-interface.md";
+    let expected =
+        "a struct of `count: u32` and `items: array<PunctualLight, N>`, see docs/shader-interface.md";
     let [count, items] = members else { return Err(expected) };
     let count_fits = (count.name.as_str(), count.ty.as_str(), count.offset_bytes) == ("count", "u32", 0);
     let bytes = items.size_bytes as usize;

@@ -475,12 +475,14 @@ fn binding_type(bound: &Bound) -> wgpu::BindingType {
         multisampled: false,
     };
     match bound.slot {
-        Slot::Frame | Slot::Lights | Slot::Material | Slot::Draw | Slot::Params => wgpu::BindingType::Buffer {
-            ty: wgpu::BufferBindingType::Uniform,
-            // Draws share one buffer, each at its own offset.
-            has_dynamic_offset: bound.slot == Slot::Draw,
-            min_binding_size: bound.block.as_ref().and_then(|(size, _)| u64::from(*size).try_into().ok()),
-        },
+        Slot::Frame | Slot::Lights | Slot::Material | Slot::Draw | Slot::Params => {
+            wgpu::BindingType::Buffer {
+                ty: wgpu::BufferBindingType::Uniform,
+                // Draws share one buffer, each at its own offset.
+                has_dynamic_offset: bound.slot == Slot::Draw,
+                min_binding_size: bound.block.as_ref().and_then(|(size, _)| u64::from(*size).try_into().ok()),
+            }
+        }
         Slot::EnvSkybox | Slot::EnvIrradiance | Slot::EnvSpecular | Slot::EnvSheen => {
             texture(wgpu::TextureViewDimension::Cube)
         }

@@ -69,7 +69,9 @@ pub(crate) fn ever_shines(light: &schema::Light, ranges: &[(LightProperty, Vec<[
     let has_range = light.kind == "directional"
         || light.range.is_none_or(|range| largest(LightProperty::Range, 0, range) > 0.0);
     let is_open = light.kind != "spot"
-        || light.spot.is_none_or(|spot| largest(LightProperty::OuterConeAngle, 0, spot.outer_cone_angle) > 0.0);
+        || light
+            .spot
+            .is_none_or(|spot| largest(LightProperty::OuterConeAngle, 0, spot.outer_cone_angle) > 0.0);
     has_power && has_color && has_range && is_open
 }
 

@@ -130,13 +130,16 @@ fn half(l: [f64; 3], v: [f64; 3]) -> [f64; 3] {
 }
 
 fn reflected(l: [f64; 3], v: [f64; 3], alpha: f64) -> f64 {
+    if l[2] <= 0.0 {
+        return 0.0;
+    }
     let h = half(l, v);
     let d = alpha * alpha
         / (std::f64::consts::PI
             * (alpha * alpha * h[2].max(0.0).powi(2) + h[0] * h[0] + h[1] * h[1]).powi(2));
     // Isotropic masking sees cosines alone.
     let seen = |cosine: f64| (cosine * cosine * (1.0 - alpha * alpha) + alpha * alpha).sqrt();
-    let (nl, nv) = (l[2].max(0.0), v[2].max(0.0));
+    let (nl, nv) = (l[2], v[2].max(0.0));
     nl * d * 0.5 / (nv * seen(nl) + nl * seen(nv)).max(1e-14)
 }
 
@@ -244,7 +247,8 @@ fn isotropic_brush_reflects_as_no_brush() {
 #[test]
 fn nothing_of_a_light_is_infinite() {
     let Some(gpu) = gpu() else { return };
-    let names = "lib::punctual::{charlie_reflected, ggx_reflected, ggx_reflected_anisotropic, punctual_alpha}";
+    let names =
+        "lib::punctual::{charlie_reflected, ggx_reflected, ggx_reflected_anisotropic, punctual_alpha}";
     let call = "vec4f(charlie_reflected(vec3f(0.0, 0.0, 1.0), b.xyz, a.xyz, punctual_alpha(a.w)), \
         ggx_reflected(vec3f(0.0, 0.0, 1.0), b.xyz, a.xyz, punctual_alpha(a.w)), \
         ggx_reflected_anisotropic(b.xyz, a.xyz, vec2f(punctual_alpha(a.w), 1.0)), 1e6)";

@@ -145,7 +145,8 @@ impl Build {
 
     /// Lazarov's fit of the split-sum table: smooth, plausible, and not constant.
     pub fn lut(&mut self) -> &mut Self {
-        let texel = |index: usize| lut_texel(index % LUT_SIZE, index / LUT_SIZE).map(f32::to_le_bytes).concat();
+        let texel =
+            |index: usize| lut_texel(index % LUT_SIZE, index / LUT_SIZE).map(f32::to_le_bytes).concat();
         let texels: Vec<u8> = (0..LUT_SIZE * LUT_SIZE).flat_map(texel).collect();
         self.target("lut/ggx", "lut", json!({ "size": LUT_SIZE, "format": "rg32f" }), &[("texels", texels)])
     }

@@ -188,7 +188,8 @@ fn sphere_under_a_spot_light_is_as_its_twin() {
             (to_light / distance, 8.0 * ramp * ramp / distance.powi(2))
         }
     };
-    let spot = json!({ "type": "spot", "intensity": 8.0, "spot": { "innerConeAngle": 0.1, "outerConeAngle": 0.3 } });
+    let spot =
+        json!({ "type": "spot", "intensity": 8.0, "spot": { "innerConeAngle": 0.1, "outerConeAngle": 0.3 } });
     let light = (spot, json!({ "translation": lamp.to_array(), "rotation": turned(0.4) }));
     let ball = Ball { metallic: 0.0, roughness: 0.8, color: 0.5 };
     check(ball, light, &arrives(0.3), &arrives(0.32));
@@ -203,7 +204,8 @@ fn light_that_is_off_leaves_no_trace_in_shader_bindings_and_picture() {
     };
     let words = |build: &Build, variant: &str| {
         let revision = build.revision();
-        let part = |part: &str| revision.part(&format!("shader/pbr/{variant}"), part).map(|bytes| bytes.to_vec());
+        let part =
+            |part: &str| revision.part(&format!("shader/pbr/{variant}"), part).map(|bytes| bytes.to_vec());
         let text = [part("wgsl"), part("reflection")].map(|part| String::from_utf8(part.unwrap_or_default()));
         text.map(|text| text.expect("it is text")).concat().to_lowercase()
     };
@@ -257,8 +259,7 @@ fn lights_beyond_the_room_of_a_shader_are_the_weakest_and_a_note_counts_them() {
         kind: LightKind::Point,
         range: None,
     };
-    let scene =
-        Scene { bounds: Some(Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE }), ..Scene::default() };
+    let scene = Scene { bounds: Some(Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE }), ..Scene::default() };
     let lights = [light(1.0, 1.0), light(8.0, 4.0), light(2.0, 1.0), light(3.0, 2.0)];
     let kept: Vec<f32> = strongest(&lights, &scene, 2).iter().map(|light| light.intensity[0]).collect();
     assert_eq!(kept, [1.0, 2.0], "by what arrives, in the file's order");
@@ -267,8 +268,11 @@ fn lights_beyond_the_room_of_a_shader_are_the_weakest_and_a_note_counts_them() {
     let lamp = |_| (json!({ "type": "point" }), json!({ "translation": [0, 0, 3] }));
     let material = json!({ "pbrMetallicRoughness": {} });
     for (count, left_out) in [(64, false), (66, true)] {
-        let sphere =
-            Sphere { material: material.clone(), lights: (0..count).map(lamp).collect(), ..Sphere::default() };
+        let sphere = Sphere {
+            material: material.clone(),
+            lights: (0..count).map(lamp).collect(),
+            ..Sphere::default()
+        };
         let notes = HeadlessViewer::new(gpu.clone(), SIZE).apply(&build(&sphere).revision()).notes;
         assert_eq!(notes.iter().any(|note| note.contains("the 2 weakest")), left_out, "{notes:?}");
     }
