@@ -17,17 +17,18 @@ const INTENSITY_MAX: f32 = 1e18;
 /// Largest 1 / range², that of a range of a micrometre.
 const INVERSE_RANGE_SQUARED_MAX: f64 = 1e12;
 
-/// How many lights a block has room for.
+/// How many lights a block of `size_bytes` has room for.
 ///
 /// # Errors
 /// What a shader must declare instead.
-pub(crate) fn capacity(members: &[Member]) -> Result<usize, &'static str> {
+pub(crate) fn capacity(size_bytes: u32, members: &[Member]) -> Result<usize, &'static str> {
     let expected =
         "a struct of `count: u32` and `items: array<PunctualLight, N>`, see docs/shader-interface.md";
     let [count, items] = members else { return Err(expected) };
     let count_fits = (count.name.as_str(), count.ty.as_str(), count.offset_bytes) == ("count", "u32", 0);
     let bytes = items.size_bytes as usize;
-    let items_fit = items.name == "items" && items.offset_bytes == 16 && items.ty.starts_with("array<");
+    let items_fit =
+        (items.name.as_str(), items.offset_bytes) == ("items", 16) && 16 + bytes <= size_bytes as usize;
     if count_fits && items_fit && bytes > 0 && bytes.is_multiple_of(LIGHT_BYTES) {
         Ok(bytes / LIGHT_BYTES)
     } else {

@@ -72,8 +72,8 @@ impl Bound {
 
     /// How many lights fit, if it is their block.
     pub fn light_capacity(&self) -> Option<usize> {
-        let (_, members) = self.block.as_ref().filter(|_| self.slot == Slot::Lights)?;
-        lights::capacity(members).ok()
+        let (size_bytes, members) = self.block.as_ref().filter(|_| self.slot == Slot::Lights)?;
+        lights::capacity(*size_bytes, members).ok()
     }
 }
 
@@ -397,7 +397,9 @@ fn check_members(
     }
     if slot == Slot::Lights {
         let declares = |expected| format!("`{shader}` declares `{block}` otherwise than as {expected}");
-        return lights::capacity(members).map(drop).map_err(|expected| Diagnostic::error(declares(expected)));
+        return lights::capacity(size_bytes, members)
+            .map(drop)
+            .map_err(|expected| Diagnostic::error(declares(expected)));
     }
     // A leading underscore marks padding: it stays zero.
     for member in members.iter().filter(|member| !member.name.starts_with('_')) {

@@ -1,15 +1,17 @@
 //! Spheres under one light beside the same shading in `f64`.
 
+use std::f32::consts::FRAC_PI_2;
 use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
 use kiln_scene::{Bounds, Light, LightKind, Scene};
+use kiln_shader::Member;
 use serde_json::{Value, json};
 
 use super::fixture::{Build, LUT_SIZE, Sphere, gpu, lut_texel};
 use super::frames::FRONT;
 use crate::HeadlessViewer;
-use crate::lights::strongest;
+use crate::lights::{block, capacity, strongest};
 
 const SIZE: [u32; 2] = [320, 180];
 const BLACK: [[f32; 3]; 6] = [[0.0; 3]; 6];
@@ -276,4 +278,65 @@ fn lights_beyond_the_room_of_a_shader_are_the_weakest_and_a_note_counts_them() {
         let notes = HeadlessViewer::new(gpu.clone(), SIZE).apply(&build(&sphere).revision()).notes;
         assert_eq!(notes.iter().any(|note| note.contains("the 2 weakest")), left_out, "{notes:?}");
     }
+}
+
+fn record(light: Light) -> Vec<f32> {
+    let block = block(&[light]);
+    assert_eq!((block.len(), block[0]), (16 + 64, 1));
+    let record: Vec<f32> = bytemuck::pod_collect_to_vec(&block[16..]);
+    assert!(record.iter().all(|value| value.is_finite()), "{record:?}");
+    record
+}
+
+#[test]
+fn records_are_finite_for_any_light() {
+    let light = |kind, intensity, range| Light {
+        intensity: [intensity; 3],
+        position: Vec3::new(1.0, 2.0, 3.0),
+        direction: Vec3::NEG_Y,
+        kind,
+        range,
+    };
+    let spot = |inner_cone_rad, outer_cone_rad| LightKind::Spot { inner_cone_rad, outer_cone_rad };
+    let sun = record(light(LightKind::Directional, 2.0, Some(0.5)));
+    assert_eq!(sun[..8], [0.0, 1.0, 0.0, 0.0, 2.0, 2.0, 2.0, 0.0], "towards it, without a range");
+    let lamp = record(light(LightKind::Point, 2.0, Some(0.5)));
+    assert_eq!(lamp[..8], [1.0, 2.0, 3.0, 1.0, 2.0, 2.0, 2.0, 4.0]);
+    assert_eq!(lamp[11..13], [1.0, 3.0], "without a cone");
+    for (inner, outer) in [(0.0, 0.0), (0.3, 0.3), (0.5, 0.3), (0.0, 1e-4), (0.0, FRAC_PI_2)] {
+        let record = record(light(spot(inner, outer), 1.0, None));
+        assert!(record[11] > 0.0 && record[12] <= 1.0 + 1e-6, "{inner} {outer}: {record:?}");
+    }
+    // 0.5°, where 1 − cosine in single precision has three digits.
+    let [scale, versine] =
+        [11, 12].map(|at| f64::from(record(light(spot(0.0, 0.008_726_646), 1.0, None))[at]));
+    assert!((versine / 3.807_663e-5 - 1.0).abs() < 1e-6 && (versine * scale - 1.0).abs() < 1e-6);
+    for (intensity, range) in [(f32::INFINITY, Some(0.0)), (f32::NAN, Some(1e-30)), (-1.0, Some(f32::MAX))] {
+        assert!(record(light(LightKind::Point, intensity, range))[4] >= 0.0);
+    }
+}
+
+#[test]
+fn block_of_lights_has_a_count_and_records_of_64_bytes() {
+    let member = |name: &str, ty: &str, offset_bytes, size_bytes| Member {
+        name: name.into(),
+        ty: ty.into(),
+        offset_bytes,
+        size_bytes,
+    };
+    let of =
+        |items: u32| [member("count", "u32", 0, 4), member("items", "array<PunctualLight, 3>", 16, items)];
+    assert_eq!(capacity(16 + 192, &of(192)), Ok(3));
+    assert!(capacity(16 + 190, &of(190)).is_err(), "half a record");
+    assert!(capacity(100, &of(192)).is_err(), "records beyond the block");
+    assert!(capacity(16, &of(0)).is_err() && capacity(192, &of(192)[1..]).is_err());
+    let Some(gpu) = gpu() else { return };
+    let text = "
+        @group(0) @binding(3) var<uniform> lights: vec4f;
+        @vertex fn vs_main(@location(0) position: vec3f) -> @builtin(position) vec4f { return vec4f(position, 1.0); }
+        @fragment fn fs_main() -> @location(0) vec4f { return lights; }";
+    let mut build = Build::ball(json!({}));
+    build.shader_text("pbr", "material", text);
+    let said = HeadlessViewer::new(gpu, SIZE).apply(&build.revision()).diagnostics;
+    assert!(said.iter().any(|fault| fault.message.contains("`lights` otherwise than as")), "{said:?}");
 }
