@@ -6,7 +6,7 @@ use crate::{Effect, EffectSet};
 
 impl Effect {
     /// Every effect, in the order of their names.
-    pub const ALL: [Effect; 16] = [
+    pub const ALL: [Effect; 17] = [
         Effect::AlphaBlend,
         Effect::AlphaMask,
         Effect::Anisotropy,
@@ -17,6 +17,7 @@ impl Effect {
         Effect::Iridescence,
         Effect::NormalMap,
         Effect::Occlusion,
+        Effect::PunctualLights,
         Effect::Sheen,
         Effect::Specular,
         Effect::Transmission,
@@ -38,6 +39,7 @@ impl Effect {
             Effect::Iridescence => "iridescence",
             Effect::NormalMap => "normal_map",
             Effect::Occlusion => "occlusion",
+            Effect::PunctualLights => "punctual_lights",
             Effect::Sheen => "sheen",
             Effect::Specular => "specular",
             Effect::Transmission => "transmission",

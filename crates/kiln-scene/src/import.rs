@@ -153,11 +153,11 @@ impl Importer<'_, '_> {
             self.add_node(node)?;
         }
         for &node in &self.pose.hidden {
-            self.add_shape(node, false)?;
+            self.add_hidden(node)?;
         }
-        if !self.lights.is_empty() {
-            self.notes.push(format!("{} punctual lights are not drawn", self.lights.len()));
-        }
+        let light_ranges = self.motion.light_ranges();
+        let ranges = |index| light_ranges.get(&index).map_or(&[][..], Vec::as_slice);
+        self.lights.retain(|(_, found)| rig::ever_shines(&found.source, ranges(found.index)));
         let carried = &mut self.scene.carried;
         self.scene.draws = carry(self.draws, Item::Draw, carried);
         self.scene.hidden = carry(self.hidden, Item::Hidden, carried);
@@ -168,7 +168,7 @@ impl Importer<'_, '_> {
         order_primitives(&mut self.scene);
         self.scene.bounds = world_bounds(&self.scene);
         let Settled { materials, flat, reads, textures, samplers, pictures, notes, mut warnings, moving } =
-            self.materials.settle(&mut self.scene);
+            self.materials.settle(&mut self.scene, !lights.is_empty());
         notes.into_iter().for_each(|note| self.notes.push(note));
         warnings.extend(self.motion.warnings);
         self.scene.materials = flat;
@@ -209,6 +209,16 @@ impl Importer<'_, '_> {
             self.lights.push((place, FoundLight { index: at.light, light, source, world }));
         }
         self.add_shape(index, true)
+    }
+
+    /// Adds the mesh of a node that is invisible at rest.
+    fn add_hidden(&mut self, index: usize) -> Result<(), SceneError> {
+        let node = &self.data.root.nodes[index];
+        if node.extensions.light.is_some() {
+            let name = node.name.clone().unwrap_or_else(|| format!("node {index}"));
+            self.notes.push(format!("the light of node `{name}` is invisible at rest and is left out"));
+        }
+        self.add_shape(index, false)
     }
 
     /// Adds a node's mesh; `shown` unless the node is invisible at rest.

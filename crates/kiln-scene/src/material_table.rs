@@ -10,8 +10,8 @@ use crate::prune::{Pruned, prune, retain_textures, settle};
 use crate::schema::{self, TextureInfo};
 use crate::textures::{Found, TextureTable, sampler};
 use crate::{
-    ColorSpace, LightReads, Material, MaterialProperty, Scene, SceneError, Texture, TextureRef, extensions,
-    specular_glossiness,
+    ColorSpace, Effect, LightReads, Material, MaterialProperty, Scene, SceneError, Texture, TextureRef,
+    extensions, specular_glossiness,
 };
 
 pub(crate) struct MaterialTable<'a, 'b> {
@@ -123,8 +123,8 @@ impl<'a, 'b> MaterialTable<'a, 'b> {
     }
 
     /// Drops what no primitive of the scene uses, decides the last effects, numbers the rest and gives the
-    /// scene its textures, images and material indices.
-    pub fn settle(mut self, scene: &mut Scene) -> Settled {
+    /// scene its textures, images and material indices. `is_lit` if the scene has lights of its own.
+    pub fn settle(mut self, scene: &mut Scene, is_lit: bool) -> Settled {
         let mut settled = Settled::default();
         let mut final_index = BTreeMap::new();
         let mut numbering = Numbering::default();
@@ -138,6 +138,9 @@ impl<'a, 'b> MaterialTable<'a, 'b> {
             let Some(colors) = used.reduce(Colors::and) else { continue };
             let Slot { name, pruned, notes, .. } = &mut self.slots[slot];
             settle(pruned, colors.any, colors.alpha_min, &|info| self.textures.range(info));
+            if is_lit && !pruned.effects.contains(&Effect::Unlit) {
+                pruned.effects.insert(Effect::PunctualLights);
+            }
             settled.notes.append(notes);
             let mut material = pruned.material.clone();
             retain_textures(&mut material, &mut |info, _| {

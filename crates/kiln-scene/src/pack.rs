@@ -63,7 +63,7 @@ pub struct SceneSummary {
     pub texels: usize,
     /// Names of cameras.
     pub cameras: Vec<String>,
-    /// Punctual lights, which are not drawn.
+    /// Punctual lights that ever shine.
     pub lights: usize,
     /// World bounds, smallest then largest coordinates.
     pub bounds: Option<[[f32; 3]; 2]>,

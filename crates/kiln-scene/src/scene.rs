@@ -22,7 +22,7 @@ pub struct Scene {
     pub images: Vec<Image8>,
     /// Cameras of the file, with their world transform.
     pub cameras: Vec<Camera>,
-    /// Punctual lights of the file.
+    /// Punctual lights of the file that ever shine.
     pub lights: Vec<Light>,
     /// What animations move, parents first; empty where nothing moves.
     pub nodes: Vec<Node>,
@@ -180,6 +180,8 @@ pub enum Effect {
     NormalMap,
     /// Occlusion texture.
     Occlusion,
+    /// Lights of the scene's own (`KHR_lights_punctual`) shine on it.
+    PunctualLights,
     /// Cloth-like retroreflection at grazing angles.
     Sheen,
     /// `KHR_materials_specular`/`ior` away from their defaults.

@@ -7,6 +7,7 @@ mod corpus;
 mod effects;
 mod geometry;
 mod hostile;
+mod lights;
 mod motion;
 mod packing;
 mod uris;
