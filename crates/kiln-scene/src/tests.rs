@@ -9,6 +9,7 @@ mod geometry;
 mod hostile;
 mod motion;
 mod packing;
+mod specular_glossiness;
 mod uris;
 mod variants;
 
