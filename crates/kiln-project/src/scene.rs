@@ -1,6 +1,6 @@
 //! Actions of `[scene.NAME]`.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -22,8 +22,6 @@ use crate::{Project, SceneConfig, SceneDemand};
 struct SceneScan {
     /// `None` if the scene cannot be drawn.
     materials: Option<Vec<MaterialEffects>>,
-    /// Files of allowed folders that are links out of them.
-    astray: BTreeSet<String>,
 }
 
 /// Version of the code behind both the scan and the action.
@@ -43,12 +41,17 @@ pub(crate) fn plan_scene(
         specular_glossiness: config.specular_glossiness,
     };
     let kind = format!("scene {}", json!(options));
-    let scan = engine.scan(&kind, PACK_RECIPE, &config.source, |tracker| {
-        scan_scene(engine.folder(), &options, &config.source, tracker)
-    })?;
+    let scan = engine
+        .scan(&kind, PACK_RECIPE, &config.source, |tracker| scan_scene(&options, &config.source, tracker))?;
+    // Where links lead is no content, so no scan can remember it.
+    let references = scan.looked_at.iter().map(|(path, _)| path).filter(|path| **path != config.source);
+    let astray: Vec<String> = references
+        .filter(|path| is_astray(engine.folder(), &options.allowed_folders, path))
+        .cloned()
+        .collect();
     let found = SceneScan::deserialize(&scan.found).unwrap_or_default();
     // While a scene cannot be read, what it last called for stays.
-    let materials = found.materials.or_else(|| last_materials(engine, name));
+    let materials = found.materials.filter(|_| astray.is_empty()).or_else(|| last_materials(engine, name));
     let is_known = materials.is_some();
     let materials: Vec<MaterialEffects> =
         materials.iter().flatten().map(|material| overridden(&project.effects, material)).collect();
@@ -60,7 +63,6 @@ pub(crate) fn plan_scene(
         scan.looked_at.iter().map(|(path, digest)| Input::Source { path: path.clone(), digest: *digest });
     let (source, files) = (config.source.clone(), scan.clone());
     let unreadable = unreadable(engine, &source);
-    let astray = found.astray;
     // Which folders are allowed shows in what was looked at; absolute ones have no place in a manifest.
     let mut params = json!({
         "source": source, "unreadable": unreadable, "specular_glossiness": config.specular_glossiness,
@@ -108,25 +110,11 @@ fn last_materials(engine: &Engine, name: &str) -> Option<Vec<MaterialEffects>> {
 
 /// Reads the scene once to learn which files it consists of and which effects it calls for. What is wrong
 /// with it is said by the action, which reads the same files.
-fn scan_scene(
-    folder: &Path,
-    options: &PackOptions,
-    source: &str,
-    tracker: &mut Tracker,
-) -> (Value, Vec<Diagnostic>) {
+fn scan_scene(options: &PackOptions, source: &str, tracker: &mut Tracker) -> (Value, Vec<Diagnostic>) {
     let Some(bytes) = tracker.read(source) else { return (json!(SceneScan::default()), Vec::new()) };
-    let mut astray = BTreeSet::new();
-    let packed = pack_with(options, source, &bytes, &mut |path| {
-        // Its content is a dependency even if it may not be used: a scan is repeated when that changes.
-        let bytes = tracker.read(path);
-        if is_astray(folder, &options.allowed_folders, path) {
-            astray.insert(path.to_owned());
-            return None;
-        }
-        bytes
-    });
-    let is_sound = astray.is_empty() && packed.glb.is_some() && !has_errors(&packed.diagnostics);
-    (json!(SceneScan { materials: is_sound.then_some(packed.effects), astray }), Vec::new())
+    let packed = pack_with(options, source, &bytes, &mut |path| tracker.read(path));
+    let is_sound = packed.glb.is_some() && !has_errors(&packed.diagnostics);
+    (json!(SceneScan { materials: is_sound.then_some(packed.effects) }), Vec::new())
 }
 
 /// Whether a path outside the project that may be referred to leads on, through a link, to a place that may not. Links

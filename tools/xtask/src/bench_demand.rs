@@ -196,14 +196,13 @@ impl Taken {
     }
 }
 
-/// `prefilter env/sky/specular mip 3` is a `prefilter specular`.
+/// `prefilter env/sky/specular mip 3` is a `prefilter specular`, `decode env/sky` a `decode`.
 fn kind_of(action: &str) -> String {
-    let mut words = action.split(' ');
-    let (verb, object) = (words.next().unwrap_or_default(), words.next().unwrap_or_default());
-    match object.strip_prefix("env/").and_then(|object| object.split_once('/')) {
-        Some((_, map)) => format!("{verb} {map}"),
-        None => verb.to_owned(),
-    }
+    let mut kind: Vec<&str> = action.split(' ').take_while(|word| !word.contains('/')).collect();
+    let of_env = action.split(' ').find_map(|word| word.strip_prefix("env/"));
+    let map = of_env.and_then(|env| Some(env.split_once('/')?.1));
+    kind.extend(map.filter(|map| !action.starts_with(&format!("prefilter {map} "))));
+    kind.join(" ")
 }
 
 fn compare(needed: &Taken, full: &Taken) {
@@ -221,7 +220,10 @@ fn compare(needed: &Taken, full: &Taken) {
     row("published", mib(|taken| taken.published_bytes), "MiB", Some(BYTES_AIM));
     row("store", mib(|taken| taken.store_bytes), "MiB", Some(BYTES_AIM));
     println!("wall-clock time of actions, which share the cores, by kind:");
-    let kinds = full.by_action.keys().chain(needed.by_action.keys().filter(|kind| !full.by_action.contains_key(*kind)));
+    let kinds = full
+        .by_action
+        .keys()
+        .chain(needed.by_action.keys().filter(|kind| !full.by_action.contains_key(*kind)));
     for kind in kinds {
         let of = |taken: &Taken| taken.by_action.get(kind).copied().unwrap_or_default();
         let [(needed_count, needed_s), (full_count, full_s)] = [of(needed), of(full)];
