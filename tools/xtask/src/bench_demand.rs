@@ -245,3 +245,22 @@ fn feature_count(bench: &Bench, project: &Path) -> Result<u32, String> {
     let count = features.split(']').next().unwrap_or_default().matches('"').count() / 2;
     u32::try_from(count).map_err(|error| error.to_string())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn actions_count_by_what_they_make() {
+        let kinds = [
+            ("decode env/sky", "decode"),
+            ("measure env/sky/specular", "measure specular"),
+            ("prefilter env/sky/specular mip 3", "prefilter specular"),
+            ("prefilter sheen env/sky/sheen mip 3", "prefilter sheen"),
+            ("compile shader/pbr/base", "compile"),
+        ];
+        for (action, kind) in kinds {
+            assert_eq!(kind_of(action), kind);
+        }
+    }
+}
