@@ -1,7 +1,6 @@
 //! The one way from a document to a scene; [`crate::pack`] and [`crate::load`] both go it.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
 
 use glam::{DMat3, DMat4, DVec3, Mat4};
 
@@ -13,8 +12,12 @@ use crate::hierarchy::{Hierarchy, Place, carry, hierarchy, rounded};
 use crate::material_table::{MaterialTable, Settled};
 use crate::pose::{Pose, joint_matrices, pose};
 use crate::textures::TextureTable;
+use crate::uri::References;
 use crate::write::GENERATOR;
-use crate::{Bounds, Camera, Draw, Item, Light, LightReads, Primitive, Scene, SceneError, VariantMaterial};
+use crate::{
+    Bounds, Camera, Draw, Item, Light, LightReads, Primitive, Scene, SceneError, SpecularGlossinessAs,
+    VariantMaterial,
+};
 use crate::{conform, extensions, limits, rig, schema, shape, variants};
 
 /// A scene, and the parts of the file that a pack needs besides.
@@ -36,20 +39,20 @@ pub(crate) struct Imported {
     pub faults: Vec<SceneError>,
 }
 
-pub(crate) type Resolve<'a> = &'a mut dyn FnMut(&str) -> Option<Arc<[u8]>>;
-
 /// Imports a document.
 ///
 /// # Errors
 /// All that is wrong at the first stage where something is wrong.
 pub(crate) fn import(
-    file: &str,
+    references: References<'_>,
+    specular_glossiness: SpecularGlossinessAs,
     document: &Document<'_>,
-    resolve: Resolve<'_>,
 ) -> Result<Imported, Vec<SceneError>> {
     let root = &document.root;
     extensions::check_required(root).map_err(|error| vec![error])?;
-    let buffers = fetch_buffers(file, root, document.bin, resolve)?;
+    let References { file, allowed_folders, read } = references;
+    let mut of_buffers = References { file, allowed_folders, read: &mut *read };
+    let buffers = fetch_buffers(&mut of_buffers, root, document.bin)?;
     let data = Data { root, buffers };
     let motion = animate::read(&data);
     let pose = pose(root, &motion.blinking()).map_err(|error| vec![error])?;
@@ -58,12 +61,12 @@ pub(crate) fn import(
     let mut faults = if is_pack { Vec::new() } else { conform::check(&document.json, &data) };
     // What is left out because of a fault is said there, and once.
     faults.retain(|fault| motion.warnings.iter().all(|warning| warning.pointer != fault.pointer));
-    let textures = TextureTable::new(file, &data, resolve);
+    let textures = TextureTable::new(References { file, allowed_folders, read }, &data);
     let importer = Importer {
         data: &data,
         pose: &pose,
         hierarchy: hierarchy(root, &pose, &motion.nodes()),
-        materials: MaterialTable::new(root, textures, motion.material_ranges()),
+        materials: MaterialTable::new(root, textures, motion.material_ranges(), specular_glossiness),
         motion,
         scene: Scene { variants: variants::names(root), ..Scene::default() },
         needs: Vec::new(),

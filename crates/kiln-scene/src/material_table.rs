@@ -10,8 +10,8 @@ use crate::prune::{Pruned, prune, retain_textures, settle};
 use crate::schema::{self, TextureInfo};
 use crate::textures::{Found, TextureTable, sampler};
 use crate::{
-    ColorSpace, Effect, LightReads, Material, MaterialProperty, Scene, SceneError, Texture, TextureRef,
-    extensions, specular_glossiness,
+    ColorSpace, Effect, LightReads, Material, MaterialProperty, Scene, SceneError, SpecularGlossinessAs,
+    Texture, TextureRef, extensions, specular_glossiness,
 };
 
 pub(crate) struct MaterialTable<'a, 'b> {
@@ -19,6 +19,7 @@ pub(crate) struct MaterialTable<'a, 'b> {
     textures: TextureTable<'a, 'b>,
     /// What animations do, by the file's material index.
     ranges: BTreeMap<usize, Ranges>,
+    specular_glossiness: SpecularGlossinessAs,
     /// Slot by the file's material index; the default material comes last.
     slots_by_index: BTreeMap<usize, usize>,
     slots: Vec<Slot>,
@@ -52,8 +53,10 @@ impl<'a, 'b> MaterialTable<'a, 'b> {
         root: &'a schema::Root,
         textures: TextureTable<'a, 'b>,
         ranges: BTreeMap<usize, Ranges>,
+        specular_glossiness: SpecularGlossinessAs,
     ) -> Self {
-        MaterialTable { root, textures, ranges, slots_by_index: BTreeMap::new(), slots: Vec::new() }
+        let (slots_by_index, slots) = (BTreeMap::new(), Vec::new());
+        MaterialTable { root, textures, ranges, specular_glossiness, slots_by_index, slots }
     }
 
     /// Number of a material in this table; read and pruned on first use. `None` is glTF's default material.
@@ -95,7 +98,7 @@ impl<'a, 'b> MaterialTable<'a, 'b> {
     }
 
     fn prepare(&mut self, mut material: schema::Material, name: String, ranges: Ranges, place: &str) -> Slot {
-        let mut notes = extensions::material_notes(&name, &material);
+        let mut notes = extensions::material_notes(&name, &material, self.specular_glossiness);
         let textures = &mut self.textures;
         let mut keep = |info: &mut TextureInfo, _: ColorSpace| {
             let set = uv_set(info);
@@ -112,7 +115,9 @@ impl<'a, 'b> MaterialTable<'a, 'b> {
             }
         }
         retain_textures(&mut material, &mut keep);
-        if let Err(reason) = specular_glossiness::convert(&mut material, &mut self.textures) {
+        let converted =
+            specular_glossiness::convert(&mut material, self.specular_glossiness, &mut self.textures);
+        if let Err(reason) = converted {
             notes.push(format!(
                 "material `{name}`: specular-glossiness textures were not converted: {reason}"
             ));

@@ -10,6 +10,7 @@ mod hostile;
 mod lights;
 mod motion;
 mod packing;
+mod specular_glossiness;
 mod uris;
 mod variants;
 

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use crate::{Effect, Packed, Scene, external_uris, load, pack, variant_name};
 
 /// The corpus folder; says loudly that a test was skipped where it is not set.
-fn corpus() -> Option<PathBuf> {
+pub(super) fn corpus() -> Option<PathBuf> {
     let folder = std::env::var_os("KILN_CORPUS").map(PathBuf::from);
     if folder.is_none() {
         report("SKIPPED: KILN_CORPUS is not set, no corpus file was read");
