@@ -36,5 +36,7 @@ fn vs_main(@builtin(vertex_index) vertex_index: u32) -> @builtin(position) vec4f
 fn fs_main(@builtin(position) position: vec4f) -> @location(0) vec4f {
     let texel = textureLoad(hdr_color, vec2i(position.xy), 0);
     let radiance = within_f16(texel.rgb);
-    return vec4f(to_srgb(tone_map(radiance * WHITE_BALANCE * frame.exposure)), texel.a);
+    // No curve has a value for less than nothing, which a grade may make.
+    let graded = max(radiance * WHITE_BALANCE * frame.exposure, vec3f(0.0));
+    return vec4f(to_srgb(tone_map(graded)), texel.a);
 }

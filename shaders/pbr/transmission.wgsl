@@ -49,6 +49,6 @@ fn scene_behind(point: vec3f, perceptual_roughness: f32) -> vec4f {
     if any(uv < vec2f(0.0)) || any(uv > vec2f(1.0)) {
         return vec4f(0.0);
     }
-    let level = perceptual_roughness * f32(textureNumLevels(scene_color) - 1u);
+    let level = perceptual_roughness * frame.scene_color_level_max;
     return textureSampleLevel(scene_color, lut_sampler, uv, level);
 }

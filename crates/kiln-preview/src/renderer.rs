@@ -139,7 +139,7 @@ impl Renderer {
     /// Draws a frame and submits it; `None` if nothing was ever shown.
     pub fn render(&self, view: &View) -> Option<wgpu::SubmissionIndex> {
         let shown = self.shown.as_ref()?;
-        let values = self.frame_values(&shown.prepared, view);
+        let values = self.frame_values(shown, view);
         for frame in shown.background.iter().chain(&shown.programs).chain([&shown.tonemap]) {
             frame.write(&self.gpu, &values, &view.parameters);
         }
@@ -160,7 +160,9 @@ impl Renderer {
         Some(self.gpu.queue.submit([encoder.finish()]))
     }
 
-    fn frame_values(&self, prepared: &Prepared, view: &View) -> FrameValues {
+    fn frame_values(&self, shown: &Shown, view: &View) -> FrameValues {
+        let prepared = &shown.prepared;
+        let scene_color_level_max = shown.scene_color.as_ref().map_or(0, SceneColor::level_max);
         let environment = &prepared.environment;
         let bounds = prepared.scene.as_ref().and_then(|scene| scene.scene.bounds);
         let camera = self.camera(view).unwrap_or(OrbitCamera::BACKGROUND_ONLY);
@@ -176,6 +178,7 @@ impl Renderer {
             irradiance_scale: environment.irradiance.scale,
             specular_scale: environment.specular.scale,
             background_blur: environment.specular.nearest_roughness(view.background_blur),
+            scene_color_level_max: scene_color_level_max as f32,
             viewport_size: self.picture.size.map(|pixels| pixels as f32),
             time_s: view.time_s,
         }

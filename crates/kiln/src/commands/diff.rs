@@ -8,7 +8,7 @@ use anyhow::Context as _;
 use kiln_image::colour::linear_to_srgb;
 use kiln_image::compare::{Comparison, Picture, compare, heat_map};
 use kiln_image::sheet::{Shot, khronos_neutral, shot_sheet};
-use kiln_image::{Limits, decode};
+use kiln_image::{Cancel, Limits, decode};
 use serde_json::{Value, json};
 
 use crate::args::DiffArgs;
@@ -173,7 +173,7 @@ impl Display {
     fn read(path: &Path) -> Result<Display, String> {
         let bytes =
             std::fs::read(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
-        let decoded = decode(&bytes, &Limits::default());
+        let decoded = decode(&bytes, &Limits::default(), Cancel::NEVER);
         let decoded = decoded.map_err(|error| format!("{} is no picture: {error}", path.display()))?;
         let is_display = ["PNG", "JPEG"].contains(&decoded.format);
         let image = decoded.image;
