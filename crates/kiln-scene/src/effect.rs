@@ -6,7 +6,7 @@ use crate::{Effect, EffectSet};
 
 impl Effect {
     /// Every effect, in the order of their names.
-    pub const ALL: [Effect; 16] = [
+    pub const ALL: [Effect; 19] = [
         Effect::AlphaBlend,
         Effect::AlphaMask,
         Effect::Anisotropy,
@@ -14,10 +14,13 @@ impl Effect {
         Effect::DiffuseTransmission,
         Effect::Dispersion,
         Effect::Emission,
+        Effect::Instancing,
         Effect::Iridescence,
+        Effect::Morph,
         Effect::NormalMap,
         Effect::Occlusion,
         Effect::Sheen,
+        Effect::Skin,
         Effect::Specular,
         Effect::Transmission,
         Effect::Unlit,
@@ -35,16 +38,24 @@ impl Effect {
             Effect::DiffuseTransmission => "diffuse_transmission",
             Effect::Dispersion => "dispersion",
             Effect::Emission => "emission",
+            Effect::Instancing => "instancing",
             Effect::Iridescence => "iridescence",
+            Effect::Morph => "morph",
             Effect::NormalMap => "normal_map",
             Effect::Occlusion => "occlusion",
             Effect::Sheen => "sheen",
+            Effect::Skin => "skin",
             Effect::Specular => "specular",
             Effect::Transmission => "transmission",
             Effect::Unlit => "unlit",
             Effect::VertexColor => "vertex_color",
             Effect::Volume => "volume",
         }
+    }
+
+    /// Whether vertices call for it, not a material.
+    pub fn is_of_geometry(self) -> bool {
+        matches!(self, Effect::Instancing | Effect::Morph | Effect::Skin)
     }
 
     /// The effect of that [`name`](Effect::name).
@@ -57,7 +68,7 @@ impl Effect {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct EffectOverrides {
-    /// Every material has these.
+    /// Every material has these, but for [those of geometry](Effect::is_of_geometry): no setting gives a mesh joints.
     pub force: EffectSet,
     /// No material has these.
     pub forbid: EffectSet,
@@ -66,7 +77,8 @@ pub struct EffectOverrides {
 impl EffectOverrides {
     /// The effects that a material is drawn with.
     pub fn apply(&self, effects: &EffectSet) -> EffectSet {
-        effects.union(&self.force).filter(|effect| !self.forbid.contains(effect)).copied().collect()
+        let forced = self.force.iter().filter(|effect| !effect.is_of_geometry());
+        effects.iter().chain(forced).filter(|effect| !self.forbid.contains(effect)).copied().collect()
     }
 }
 

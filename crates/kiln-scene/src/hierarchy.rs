@@ -1,6 +1,6 @@
 //! The nodes that a moving scene keeps. A scene at rest needs none: its draws stand in the world.
 //!
-//! Kept are the nodes that channels name and what those hang on. Everything between such a node and a draw is
+//! Kept are the nodes that channels name, joints of skins that move, and what those hang on. Everything between such a node and a draw is
 //! one matrix, so that a pack, where the draw is that node's child, comes out as the same pack again.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -42,10 +42,15 @@ pub(crate) struct Place {
     pub local: DMat4,
 }
 
-/// Keeps `named` nodes and what they hang on.
-pub(crate) fn hierarchy(root: &Root, pose: &Pose, named: &BTreeSet<usize>) -> Hierarchy {
+/// Keeps `named` nodes, `joints`, and what they hang on.
+pub(crate) fn hierarchy(
+    root: &Root,
+    pose: &Pose,
+    named: &BTreeSet<usize>,
+    joints: &BTreeSet<usize>,
+) -> Hierarchy {
     let mut wanted = BTreeSet::new();
-    for &node in named {
+    for &node in named.union(joints) {
         let mut next = Some(node);
         while let Some(node) = next.filter(|node| wanted.insert(*node)) {
             next = pose.parents[node];
@@ -98,6 +103,29 @@ fn held(root: &Root, pose: &Pose, hierarchy: &Hierarchy) -> BTreeMap<usize, Held
 }
 
 impl Hierarchy {
+    /// Keeps `used` nodes and what they hang on alone; returns the new number of each.
+    pub fn retain(&mut self, mut used: BTreeSet<usize>) -> Vec<usize> {
+        for node in (0..self.nodes.len()).rev() {
+            if used.contains(&node) {
+                used.extend(self.nodes[node].parent);
+            }
+        }
+        let mut next = 0..;
+        let numbers: Vec<usize> = (0..self.nodes.len())
+            .map(|node| if used.contains(&node) { next.next().unwrap_or(0) } else { usize::MAX })
+            .collect();
+        let mut at = 0..;
+        self.nodes.retain(|_| at.next().is_some_and(|node| used.contains(&node)));
+        for node in &mut self.nodes {
+            node.parent = node.parent.map(|parent| numbers[parent]);
+        }
+        self.kept.retain(|_, node| {
+            *node = numbers[*node];
+            *node != usize::MAX
+        });
+        numbers
+    }
+
     /// Where a node of the file stands.
     pub fn place(&self, pose: &Pose, node: usize) -> Place {
         match self.held.get(&node) {
@@ -111,6 +139,11 @@ impl Hierarchy {
 }
 
 impl Place {
+    /// In the world, seen when the node is.
+    pub fn seen_with(self) -> Place {
+        Place { local: DMat4::IDENTITY, ..self }
+    }
+
     /// In the world.
     pub fn still(world: DMat4) -> Place {
         Place { node: None, base: DMat4::IDENTITY, local: world }
