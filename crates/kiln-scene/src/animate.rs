@@ -79,7 +79,9 @@ fn node_of(target: Target) -> Option<usize> {
         | Target::Rotation { node }
         | Target::Scale { node }
         | Target::Visibility { node } => Some(node),
-        Target::Weights { .. } | Target::Material { .. } | Target::Camera { .. } | Target::Light { .. } => None,
+        Target::Weights { .. } | Target::Material { .. } | Target::Camera { .. } | Target::Light { .. } => {
+            None
+        }
     }
 }
 

@@ -89,8 +89,7 @@ impl Budget {
 
     pub fn spend_deltas(&mut self, count: usize, pointer: &str) -> Result<(), SceneError> {
         let limit = limits::MORPH_DELTA_COUNT_MAX;
-        let fault =
-            || SceneError::new(pointer, format!("the vertices of all morph targets exceed {limit}"));
+        let fault = || SceneError::new(pointer, format!("the vertices of all morph targets exceed {limit}"));
         self.deltas_left = self.deltas_left.checked_sub(count).ok_or_else(fault)?;
         Ok(())
     }
@@ -154,7 +153,9 @@ pub(crate) fn read(
         Placing::Instance => {}
         Placing::Joints(count) => reader.hang(&mut geometry, count, budget)?,
         Placing::Skin(joints) => reader.skin(&mut geometry, joints, budget)?,
-        Placing::Flattened(world) => (0..geometry.vertices.len()).for_each(|at| place(&mut geometry, at, world)),
+        Placing::Flattened(world) => {
+            (0..geometry.vertices.len()).for_each(|at| place(&mut geometry, at, world))
+        }
     }
     Ok(Read::Geometry(geometry))
 }
@@ -283,7 +284,12 @@ impl Reader<'_, '_> {
     }
 
     /// Reads what weights add, of the `live` targets that add anything.
-    fn targets(&self, geometry: &mut Geometry, live: &[usize], budget: &mut Budget) -> Result<(), SceneError> {
+    fn targets(
+        &self,
+        geometry: &mut Geometry,
+        live: &[usize],
+        budget: &mut Budget,
+    ) -> Result<(), SceneError> {
         let found = live.iter().filter_map(|&at| Some((at, self.primitive.targets.get(at)?)));
         for (at, target) in found {
             budget.spend(self.count as u64, self.pointer)?;

@@ -200,7 +200,8 @@ impl Importer<'_, '_> {
         order_skins(&mut self.scene);
         order_nodes(&mut self.scene, &mut self.hierarchy, &self.motion.nodes());
         let mut morphs = Vec::new();
-        for number in self.scene.draws.iter_mut().chain(&mut self.scene.hidden).filter_map(|it| it.morph.as_mut())
+        for number in
+            self.scene.draws.iter_mut().chain(&mut self.scene.hidden).filter_map(|it| it.morph.as_mut())
         {
             morphs.push(&self.morphs[*number]);
             *number = morphs.len() - 1;
@@ -461,4 +462,3 @@ fn copies(indices: impl Iterator<Item = usize>) -> BTreeMap<usize, Vec<usize>> {
     indices.enumerate().for_each(|(at, index)| copies.entry(index).or_default().push(at));
     copies
 }
-

@@ -96,7 +96,8 @@ fn local_bounds(
     budget.spend(steps as u64, "")?;
     let weights = draw.morph.map_or(&[][..], |morph| &posed.morphs[morph]);
     let joints = draw.skin.map_or(&[][..], |skin| &posed.skins[skin]);
-    let positions = (0..primitive.vertices.len()).map(|at| primitive.deformed_vertex(at, weights, joints).position);
+    let positions =
+        (0..primitive.vertices.len()).map(|at| primitive.deformed_vertex(at, weights, joints).position);
     let finite = positions.filter(|position| position.is_finite());
     let ends = finite.map(|it| (it, it)).reduce(|a: (DVec3, DVec3), b| (a.0.min(b.0), a.1.max(b.1)));
     Ok(ends.map_or(primitive.bounds, |(min, max)| Bounds { min: min.as_vec3(), max: max.as_vec3() }))

@@ -49,7 +49,11 @@ impl Importer<'_, '_> {
             }
         }
         let look = Look { part, live: Vec::new(), joints };
-        if self.data.root.nodes[node].weights.is_some() { self.read(node, &look) } else { self.shared(node, look) }
+        if self.data.root.nodes[node].weights.is_some() {
+            self.read(node, &look)
+        } else {
+            self.shared(node, look)
+        }
     }
 
     fn shared(&mut self, node: usize, look: Look) -> Result<Option<Part>, SceneError> {

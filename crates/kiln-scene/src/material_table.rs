@@ -10,8 +10,8 @@ use crate::prune::{Pruned, prune, retain_textures, settle};
 use crate::schema::{self, TextureInfo};
 use crate::textures::{Found, TextureTable, sampler};
 use crate::{
-    AlphaMode, ColorSpace, Effect, LightReads, Material, MaterialProperty, Scene, SceneError, Texture, TextureRef, extensions,
-    specular_glossiness,
+    AlphaMode, ColorSpace, Effect, LightReads, Material, MaterialProperty, Scene, SceneError, Texture,
+    TextureRef, extensions, specular_glossiness,
 };
 
 pub(crate) struct MaterialTable<'a, 'b> {

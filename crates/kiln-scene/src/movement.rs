@@ -98,9 +98,7 @@ fn moved_nodes(root: &Root, motion: &Motion) -> BTreeSet<usize> {
             Target::Rotation { node } => {
                 (node, curve.departs_from(&root.nodes[node].rotation.unwrap_or([0.0, 0.0, 0.0, 1.0])))
             }
-            Target::Scale { node } => {
-                (node, curve.departs_from(&root.nodes[node].scale.unwrap_or([1.0; 3])))
-            }
+            Target::Scale { node } => (node, curve.departs_from(&root.nodes[node].scale.unwrap_or([1.0; 3]))),
             _ => return None,
         };
         departs.then_some(node)

@@ -163,9 +163,8 @@ fn effects(imported: &Imported) -> Vec<MaterialEffects> {
 }
 
 fn summary(scene: &Scene) -> SceneSummary {
-    let triangles = |draw: &crate::Draw| {
-        scene.primitives[draw.primitive].indices.len() / 3 * draw.instances.len().max(1)
-    };
+    let triangles =
+        |draw: &crate::Draw| scene.primitives[draw.primitive].indices.len() / 3 * draw.instances.len().max(1);
     SceneSummary {
         primitives: scene.primitives.len(),
         draws: scene.draws.len(),

@@ -121,7 +121,9 @@ impl Posed {
             curve.sample(time_s, &mut value);
             match channel.target {
                 Target::Weights { morph } => self.morphs[morph].copy_from_slice(&value),
-                Target::Camera { camera, property } => set_camera(&mut self.cameras[camera], property, value[0]),
+                Target::Camera { camera, property } => {
+                    set_camera(&mut self.cameras[camera], property, value[0])
+                }
                 Target::Light { light, property } => {
                     let source = lights.entry(light).or_insert_with(|| scene.sources.lights[light].clone());
                     set_light(source, property, &value);

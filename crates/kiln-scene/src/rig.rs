@@ -106,7 +106,8 @@ pub(crate) fn instances(
         return Err(SceneError::new(place, format!("the instances of all nodes exceed {limit}")));
     }
     let uneven = counts.iter().any(|&it| it != count);
-    let remark = uneven.then(|| format!("{place}: they differ in length, the first {count} instances are drawn"));
+    let remark =
+        uneven.then(|| format!("{place}: they differ in length, the first {count} instances are drawn"));
     let read = |name: &str, kind: &str, neutral: [f32; 4]| match instancing.attributes.get(name) {
         Some(&index) => data.floats::<4>(index, &format!("{place}/{name}"), &[kind], neutral),
         None => Ok(vec![neutral; count as usize]),

@@ -73,7 +73,8 @@ pub(crate) fn finish(mut geometry: Geometry, needs: Needs) -> (Geometry, Vec<Str
     if needs.normals && !geometry.has_normals {
         unshare(&mut geometry);
         flat_normals(&mut geometry);
-        let what = "morph targets do not move the normals, which are missing: the unmorphed shape's flat ones stay";
+        let what =
+            "morph targets do not move the normals, which are missing: the unmorphed shape's flat ones stay";
         remark(geometry.targets.len(), "/attributes", what);
         split = true;
     } else if needs.normals {

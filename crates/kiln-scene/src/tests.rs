@@ -4,11 +4,14 @@ mod animation;
 mod build;
 mod conform;
 mod corpus;
+mod deforming;
 mod effects;
 mod geometry;
 mod hostile;
 mod motion;
 mod packing;
+mod playing;
+mod second_reader;
 mod uris;
 mod variants;
 

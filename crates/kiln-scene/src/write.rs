@@ -103,7 +103,8 @@ impl Writer {
     /// Writes what stands still, then what moves.
     fn nodes(&mut self, imported: &Imported) -> Placed {
         let scene = &imported.scene;
-        let draws: BTreeMap<Item, Node> = all_draws(scene).map(|(item, draw)| (item, self.draw_node(scene, draw))).collect();
+        let draws: BTreeMap<Item, Node> =
+            all_draws(scene).map(|(item, draw)| (item, self.draw_node(scene, draw))).collect();
         let make = |item: Item, matrix: Mat4| {
             let world = node(None, matrix).matrix;
             match item {

@@ -201,4 +201,3 @@ fn pad<const N: usize>(values: [f32; N]) -> [f32; 4] {
     padded[..N].copy_from_slice(&values);
     padded
 }
-

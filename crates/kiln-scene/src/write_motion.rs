@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use glam::Mat4;
 use crate::schema::{
     self, Accessor, AnimationChannel, AnimationSampler, ChannelTarget, Pointer, TargetExtensions,
     VariantMapping, VariantMappings, Visibility,
@@ -10,6 +9,7 @@ use crate::schema::{
 use crate::write::{FLOAT, Placed, Writer, node};
 use crate::write_geometry::whole;
 use crate::{Animation, Curve, Interpolation, Item, Scene, Target, Transform};
+use glam::Mat4;
 
 const UNSIGNED_BYTE: u32 = 5121;
 
