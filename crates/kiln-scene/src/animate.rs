@@ -1,6 +1,7 @@
 //! Reads a file's animations. One that is wrong is left out with a warning: the rest pose needs none of them.
 //! Warnings have the places of `conform/animations`, whose word on the same place then is not needed.
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::accessor::Data;
@@ -106,17 +107,19 @@ pub(crate) fn retarget<'a>(
         for channel in &source.channels {
             for Resolved { target, components } in resolve(channel.target).into_iter().take(left) {
                 left -= 1;
-                let key = (channel.curve, components);
-                if !numbers.contains_key(&key) {
-                    let whole = &source.curves[channel.curve];
-                    let Some(rest) = values_left.checked_sub(whole.values.len()) else { continue };
-                    values_left = rest;
-                    let is_whole = components.is_none_or(|them| them.iter().copied().eq(0..whole.width));
-                    let part = components.filter(|_| !is_whole);
-                    animation.curves.push(part.map_or_else(|| whole.clone(), |them| whole.components(them)));
-                    numbers.insert(key, animation.curves.len() - 1);
-                }
-                animation.channels.push(Channel { target, curve: numbers[&key] });
+                let curve = match numbers.entry((channel.curve, components)) {
+                    Entry::Occupied(known) => *known.get(),
+                    Entry::Vacant(place) => {
+                        let whole = &source.curves[channel.curve];
+                        let Some(rest) = values_left.checked_sub(whole.values.len()) else { continue };
+                        values_left = rest;
+                        let part = components.filter(|them| !them.iter().copied().eq(0..whole.width));
+                        let curve = part.map_or_else(|| whole.clone(), |them| whole.components(them));
+                        animation.curves.push(curve);
+                        *place.insert(animation.curves.len() - 1)
+                    }
+                };
+                animation.channels.push(Channel { target, curve });
             }
         }
         animation

@@ -154,7 +154,9 @@ pub(crate) fn read(
         Placing::Joints(count) => reader.hang(&mut geometry, count, budget)?,
         Placing::Skin(joints) => reader.skin(&mut geometry, joints, budget)?,
         Placing::Flattened(world) => {
-            (0..geometry.vertices.len()).for_each(|at| place(&mut geometry, at, world))
+            for at in 0..geometry.vertices.len() {
+                place(&mut geometry, at, world);
+            }
         }
     }
     Ok(Read::Geometry(geometry))
@@ -395,7 +397,7 @@ fn add<const N: usize>(value: &mut [f32; N], delta: Option<[f32; 3]>, weight: f3
 /// Whether weights are negative, no numbers, or do not sum up to 1.
 fn is_odd(pairs: &[(usize, f64)]) -> bool {
     let total: f64 = pairs.iter().map(|&(_, weight)| weight).sum();
-    !((total - 1.0).abs() <= WEIGHT_SUM_TOLERANCE) || pairs.iter().any(|(_, it)| *it < 0.0)
+    total.is_nan() || (total - 1.0).abs() > WEIGHT_SUM_TOLERANCE || pairs.iter().any(|(_, it)| *it < 0.0)
 }
 
 /// The four heaviest of a vertex's joints, in the file's order, and the share of those left out. A vertex that no

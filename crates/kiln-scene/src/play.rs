@@ -122,7 +122,7 @@ impl Posed {
             match channel.target {
                 Target::Weights { morph } => self.morphs[morph].copy_from_slice(&value),
                 Target::Camera { camera, property } => {
-                    set_camera(&mut self.cameras[camera], property, value[0])
+                    set_camera(&mut self.cameras[camera], property, value[0]);
                 }
                 Target::Light { light, property } => {
                     let source = lights.entry(light).or_insert_with(|| scene.sources.lights[light].clone());

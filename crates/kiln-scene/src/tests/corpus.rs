@@ -277,6 +277,17 @@ fn fox_skinned_at_rest_is_where_it_was_modelled() {
 }
 
 #[test]
+fn simple_instancing_is_one_draw() {
+    check_file(&Expected {
+        file: "SimpleInstancing/glTF/SimpleInstancing.gltf",
+        triangles: 1500,
+        draws: 1,
+        variants: &["instancing"],
+        bounds: [[-1.666_667; 3], [12.731_707; 3]],
+    });
+}
+
+#[test]
 fn animations_of_the_fox_are_read_whole() {
     let Some(corpus) = corpus() else { return };
     let packed = pack_file(&corpus, "gltf/khronos-sample-assets/Fox/glTF/Fox.gltf");

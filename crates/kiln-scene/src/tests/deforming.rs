@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::build::File;
 use super::motion::{animate, pointer, variant};
 use super::{check_within, pack_alone, refusal, scene_of};
-use crate::{Instance, MorphDelta, Scene, load};
+use crate::{Effect, EffectOverrides, Instance, MorphDelta, Scene, load};
 
 /// A triangle that hangs on nodes 1 and 2, the second below the first; node 0 has the mesh and stands elsewhere.
 pub(super) fn skinned() -> File {
@@ -249,6 +249,14 @@ fn copies_that_mirror_or_flatten_or_are_blended_are_drawn_apart() {
     glass.primitive()["material"] = json!(0);
     assert_eq!(scene_of(&glass.bytes_of()).draws.len(), 5);
     assert_eq!(variant(glass), "alpha_blend");
+}
+
+#[test]
+fn no_setting_gives_a_draw_joints() {
+    let overrides =
+        EffectOverrides { force: [Effect::Skin, Effect::Sheen].into(), forbid: [Effect::Morph].into() };
+    assert_eq!(overrides.apply(&[Effect::Morph].into()), [Effect::Sheen].into());
+    assert_eq!(overrides.apply(&[Effect::Skin].into()), [Effect::Sheen, Effect::Skin].into());
 }
 
 #[test]

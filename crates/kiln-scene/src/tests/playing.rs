@@ -59,13 +59,46 @@ fn weights_move_vertices_in_step() {
 /// A still file is morphed and skinned while it is read; a moving one by the player.
 #[test]
 fn rest_pose_is_what_a_file_without_animations_is() {
-    for moving in [moving_skin()] {
+    let mut morphing = morphed();
+    let weights = [0.5, 0.0, 0.0, 0.0, 0.0, 1.0];
+    let target = json!({"node": 0, "path": "weights"});
+    animate(&mut morphing, target, "LINEAR", &[0.0, 1.0], &weights, "SCALAR");
+    for moving in [moving_skin(), morphing] {
         let mut still = moving.clone();
         still.root.as_object_mut().unwrap().remove("animations");
         let (still, moving) = (scene_of(&still.bytes()), scene_of(&moving.bytes()));
-        assert!(still.draws[0].skin.is_none() && moving.draws[0].skin.is_some());
+        assert!(still.draws[0].effects().is_empty() && moving.draws[0].effects().len() == 1);
         let [still, moving] = [still, moving].map(|scene| placed(&scene, &scene.pose(None, 0.0), 0));
         assert_eq!(still, moving);
+    }
+}
+
+/// The skin is part of the vertices and of what is added to them; beside it, one whose joints move later.
+#[test]
+fn morph_of_a_skin_that_stands_still_is_that_of_the_skin() {
+    let file = |later: f32| {
+        let mut file = skinned();
+        let deltas = file.floats(&[[1.0, 2.0, 3.0]; 3]);
+        let normals = file.floats(&[[0.5, 0.25, 0.0]; 3]);
+        file.primitive()["targets"] = json!([{"POSITION": deltas, "NORMAL": normals}]);
+        file.root["nodes"][1]["rotation"] = json!([0.6, 0, 0, 0.8]);
+        file.root["nodes"][2]["scale"] = json!([1, 2, 3]);
+        let joints = [[0.0, 0.0, 4.0], [0.0, 0.0, 4.0], [0.0, later, 4.0]].concat();
+        let target = json!({"node": 2, "path": "translation"});
+        animate(&mut file, target, "LINEAR", &[0.0, 1.0, 2.0], &joints, "VEC3");
+        let target = json!({"node": 0, "path": "weights"});
+        animate(&mut file, target, "LINEAR", &[0.0, 1.0], &[0.0, 1.0], "SCALAR");
+        scene_of(&file.bytes())
+    };
+    let (baked, kept) = (file(0.0), file(9.0));
+    assert!(baked.draws[0].skin.is_none() && kept.draws[0].skin.is_some());
+    let (a, b) = (baked.pose(Some(1), 0.5), kept.pose(Some(1), 0.5));
+    let ours = placed(&baked, &a, 0);
+    check_within("positions", ours.as_flattened(), placed(&kept, &b, 0).as_flattened(), 1e-5);
+    for at in 0..3 {
+        let theirs = kept.primitives[0].deformed_vertex(at, &b.morphs[0], &b.skins[0]).normal;
+        let ours = baked.primitives[0].morphed_vertex(at, &a.morphs[0]).normal;
+        check_within("normals", &ours.as_vec3().to_array(), &theirs.as_vec3().to_array(), 1e-6);
     }
 }
 

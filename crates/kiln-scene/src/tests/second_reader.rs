@@ -92,9 +92,9 @@ impl Other {
             .nodes()
             .flat_map(|node| node.children().map(move |child| (child.index(), node.index())))
             .collect();
-        for node in 0..locals.len() {
+        for (node, world) in worlds.iter_mut().enumerate() {
             let chain = std::iter::successors(Some(node), |at| parents.get(at).copied());
-            worlds[node] = chain.fold(DMat4::IDENTITY, |below, at| {
+            *world = chain.fold(DMat4::IDENTITY, |below, at| {
                 let Local { translation, rotation, scale, matrix, .. } = locals[at].clone();
                 let trs = || {
                     DMat4::from_translation(translation)
