@@ -49,13 +49,8 @@ pub(crate) fn hierarchy(
     named: &BTreeSet<usize>,
     joints: &BTreeSet<usize>,
 ) -> Hierarchy {
-    let mut wanted = BTreeSet::new();
-    for &node in named.union(joints) {
-        let mut next = Some(node);
-        while let Some(node) = next.filter(|node| wanted.insert(*node)) {
-            next = pose.parents[node];
-        }
-    }
+    let carriers = with_ancestors(pose, named);
+    let wanted = with_ancestors(pose, &named.union(joints).copied().collect());
     let mut hierarchy = Hierarchy::default();
     for &node in pose.order.iter().filter(|node| wanted.contains(node)) {
         let source = &root.nodes[node];
@@ -77,15 +72,32 @@ pub(crate) fn hierarchy(
         });
         hierarchy.moves.push(moves);
     }
-    hierarchy.held = held(root, pose, &hierarchy);
+    hierarchy.held = held(root, pose, &hierarchy, &carriers);
     hierarchy
 }
 
-/// Nodes that move; large files have few, so the others take no memory.
-fn held(root: &Root, pose: &Pose, hierarchy: &Hierarchy) -> BTreeMap<usize, Held> {
+fn with_ancestors(pose: &Pose, nodes: &BTreeSet<usize>) -> BTreeSet<usize> {
+    let mut found = BTreeSet::new();
+    for &node in nodes {
+        let mut next = Some(node);
+        while let Some(node) = next.filter(|node| found.insert(*node)) {
+            next = pose.parents[node];
+        }
+    }
+    found
+}
+
+/// Nodes that move; large files have few, so the others take no memory. What is kept for its joints alone carries
+/// nothing: its skin may turn out not to be drawn.
+fn held(
+    root: &Root,
+    pose: &Pose,
+    hierarchy: &Hierarchy,
+    carriers: &BTreeSet<usize>,
+) -> BTreeMap<usize, Held> {
     let mut found = BTreeMap::new();
     for &node in &pose.order {
-        if let Some(&kept) = hierarchy.kept.get(&node) {
+        if let Some(&kept) = hierarchy.kept.get(&node).filter(|_| carriers.contains(&node)) {
             if hierarchy.moves[kept] {
                 found.insert(node, Held { kept, carrier: node, local: DMat4::IDENTITY });
             }

@@ -46,13 +46,11 @@ pub(super) fn order_skins(scene: &mut Scene) {
     scene.skins = used.into_iter().map(|skin| scene.skins[skin].clone()).collect();
 }
 
-/// Leaves out nodes that neither move, nor carry anything, nor are joints of what is drawn. `named` are those that channels
-/// name.
+/// Leaves out nodes that neither move nor are joints of what is drawn. `named` are those that channels name.
 pub(super) fn order_nodes(scene: &mut Scene, hierarchy: &mut Hierarchy, named: &BTreeSet<usize>) {
     let joints = scene.skins.iter().flat_map(|skin| skin.joints.iter().copied());
-    let carriers = scene.carried.iter().map(|carried| carried.node);
     let used = named.iter().filter_map(|node| hierarchy.kept.get(node).copied());
-    let numbers = hierarchy.retain(used.chain(joints).chain(carriers).collect());
+    let numbers = hierarchy.retain(used.chain(joints).collect());
     for carried in &mut scene.carried {
         carried.node = numbers[carried.node];
     }

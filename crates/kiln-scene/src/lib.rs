@@ -21,7 +21,7 @@ pub use error::SceneError;
 pub use images::decode_image;
 
 pub use pack::{LightReads, MaterialEffects, Packed, SceneSummary, load, pack};
-pub use play::{Posed, PosedDraw};
+pub use play::{Posed, PosedDraw, Sources};
 pub use property::{CameraProperty, LightProperty, MaterialProperty, TextureSlot};
 pub use scene::*;
 pub use uri::{Uri, UriKind, external_uris};

@@ -59,13 +59,13 @@ struct PosedNode {
 
 /// What a player needs of the file besides the scene.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Sources {
+pub struct Sources {
     /// Materials that some channel changes.
-    pub materials: BTreeMap<usize, schema::Material>,
+    pub(crate) materials: BTreeMap<usize, schema::Material>,
     /// What the scene's textures are of the pack's.
-    pub textures: Vec<(usize, ColorSpace)>,
+    pub(crate) textures: Vec<(usize, ColorSpace)>,
     /// As the scene's.
-    pub lights: Vec<schema::Light>,
+    pub(crate) lights: Vec<schema::Light>,
 }
 
 impl Scene {

@@ -47,8 +47,8 @@ pub struct Scene {
     pub bounds: Option<Bounds>,
     /// What the file asks for and this version draws approximately or not at all, a line each.
     pub notes: Vec<String>,
-    /// What a player needs of the file besides.
-    pub(crate) sources: Sources,
+    /// What [`Scene::pose`] needs of the file besides.
+    pub sources: Sources,
 }
 
 /// An axis-aligned box.

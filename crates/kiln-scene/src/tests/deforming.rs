@@ -97,6 +97,21 @@ fn skinned_draw_stands_where_its_joints_do() {
     assert_eq!((bounds.min.to_array(), bounds.max.to_array()), ([0.0, 10.0, 0.0], [2.0, 11.0, 4.0]));
 }
 
+/// A skin that turns out not to be drawn leaves no nodes, and what hangs on its joints hangs where it moves.
+#[test]
+fn joints_of_what_is_not_drawn_are_not_kept() {
+    let mut file = moved(skinned(), 1, [1.0, 0.0, 4.0]);
+    let mesh = file.root["meshes"][0].clone();
+    file.primitive()["mode"] = json!(1);
+    file.root["meshes"].as_array_mut().unwrap().push(mesh);
+    file.root["nodes"][2]["mesh"] = json!(1);
+    let scene = scene_of(&file.bytes_of());
+    let names: Vec<&str> = scene.nodes.iter().map(|node| node.name.as_str()).collect();
+    assert_eq!((names, scene.skins.len()), (vec!["hip"], 0));
+    assert_eq!((scene.carried.len(), scene.carried[0].node), (1, 0));
+    assert_eq!(variant(file), "base");
+}
+
 #[test]
 fn four_heaviest_of_eight_joints_count_and_that_is_said() {
     let file = |last: f32| {
