@@ -1,7 +1,8 @@
 //! The nodes that a moving scene keeps. A scene at rest needs none: its draws stand in the world.
 //!
-//! Kept are the nodes that channels name, joints of skins that move, and what those hang on. Everything between such a node and a draw is
-//! one matrix, so that a pack, where the draw is that node's child, comes out as the same pack again.
+//! Kept are the nodes that channels name, joints of skins that move, and what those hang on. Everything between a
+//! node that channels name and a draw is one matrix, so that a pack, where the draw is that node's child, comes out as
+//! the same pack again.
 
 use std::collections::{BTreeMap, BTreeSet};
 

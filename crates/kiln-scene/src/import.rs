@@ -10,7 +10,7 @@ use crate::animate::{self, Motion, Renumbering, retarget};
 use crate::document::Document;
 use crate::geometry::{Budget, Needs, Placing, has_joints};
 use crate::hierarchy::{Hierarchy, Place, carry, hierarchy, rounded};
-use crate::import::order::{order_nodes, order_primitives, order_skins, world_bounds};
+use crate::import::order::{order_morphs, order_nodes, order_primitives, order_skins, world_bounds};
 use crate::import::parts::{Look, Part};
 use crate::material_table::{MaterialTable, Settled};
 use crate::movement::{Movement, movement, rest_weights};
@@ -199,14 +199,7 @@ impl Importer<'_, '_> {
         order_primitives(&mut self.scene);
         order_skins(&mut self.scene);
         order_nodes(&mut self.scene, &mut self.hierarchy, &self.motion.nodes());
-        let mut morphs = Vec::new();
-        for number in
-            self.scene.draws.iter_mut().chain(&mut self.scene.hidden).filter_map(|it| it.morph.as_mut())
-        {
-            morphs.push(&self.morphs[*number]);
-            *number = morphs.len() - 1;
-        }
-        self.scene.morphs = morphs.iter().map(|morph| morph.weights.clone()).collect();
+        let morphs = order_morphs(&mut self.scene, &self.morphs);
         self.scene.sources.lights = lights.iter().map(|it| it.source.clone()).collect();
         self.scene.nodes = std::mem::take(&mut self.hierarchy.nodes);
         self.scene.bounds = world_bounds(&self.scene, &mut self.budget)?;

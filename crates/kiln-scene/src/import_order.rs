@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DVec3, Mat4};
 
+use super::Morph;
 use crate::geometry::Budget;
 use crate::hierarchy::Hierarchy;
 use crate::{Bounds, Draw, Posed, Primitive, Scene, SceneError};
@@ -44,6 +45,17 @@ pub(super) fn order_skins(scene: &mut Scene) {
         *skin = number;
     }
     scene.skins = used.into_iter().map(|skin| scene.skins[skin].clone()).collect();
+}
+
+/// Numbers what morphs in the order in which it is drawn, and gives the scene the weights.
+pub(super) fn order_morphs<'a>(scene: &mut Scene, morphs: &'a [Morph]) -> Vec<&'a Morph> {
+    let mut ordered = Vec::new();
+    for morph in scene.draws.iter_mut().chain(&mut scene.hidden).filter_map(|draw| draw.morph.as_mut()) {
+        ordered.push(&morphs[*morph]);
+        *morph = ordered.len() - 1;
+    }
+    scene.morphs = ordered.iter().map(|morph| morph.weights.clone()).collect();
+    ordered
 }
 
 /// Leaves out nodes that neither move nor are joints of what is drawn. `named` are those that channels name.

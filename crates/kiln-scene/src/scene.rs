@@ -227,7 +227,8 @@ pub struct VariantMaterial {
     pub variants: Vec<usize>,
 }
 
-/// One phenomenon that a material, or a draw's geometry, calls for. [`Effect::name`] is the feature the shader is compiled with.
+/// One phenomenon that a material, or a draw's geometry, calls for. [`Effect::name`] is the feature the shader is
+/// compiled with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Effect {
     /// Alpha below the cutoff is discarded.

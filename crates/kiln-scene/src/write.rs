@@ -1,8 +1,8 @@
 //! Writes an imported scene as one normalised GLB.
 //!
-//! One buffer; each primitive a mesh of its own (`write_geometry`); images in buffer views; each draw, camera and light a top node with its world matrix, or the child of a node
-//! that moves (`write_motion`). Matrices may shear, which a tool that insists on translation, rotation and scale
-//! will remark.
+//! One buffer; each primitive a mesh of its own (`write_geometry`); images in buffer views; each draw, camera and light
+//! a top node with its world matrix, or the child of a node that moves (`write_motion`). Matrices may shear, which a
+//! tool that insists on translation, rotation and scale will remark.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -166,7 +166,7 @@ fn transmission_is_an_effect_and_drawn_as_asked() {
     material["pbrMetallicRoughness"] = json!({"metallicFactor": 0.0});
     let packed = pack_alone(&File::with_material(material).bytes());
     assert!(packed.calls_for(Effect::Transmission));
-    assert!(packed.diagnostics.is_empty(), "{:?}", packed.diagnostics);
+    assert!(packed.diagnostics.iter().all(|it| !it.message.contains("approximated")));
 }
 
 /// A dielectric with these extensions of `KHR_materials_…`.
