@@ -14,6 +14,30 @@ struct Frame {
     background_blur: f32,
 }
 
+// A light of the scene's own. KHR_lights_punctual.
+struct PunctualLight {
+    // Homogeneous, in the world: a place with w = 1, or with w = 0 the direction towards what is infinitely far.
+    position: vec4f,
+    // Colour times intensity, in candela; in lux where w = 0. A lux on white Lambert gives radiance 1/π.
+    intensity: vec3f,
+    // 0 for light that reaches any distance.
+    inverse_range_squared: f32,
+    // Where it shines, unit length.
+    direction: vec3f,
+    // 1 / (cos(inner) - cos(outer)) of a spot's cone; 1 without a cone.
+    cone_scale: f32,
+    // 1 - cos(outer); 3 without a cone, which no angle reaches.
+    outer_versine: f32,
+}
+
+// A shader may have room for another number of lights: the strongest go first.
+const LIGHT_COUNT_MAX: u32 = 64u;
+
+struct Lights {
+    count: u32,
+    items: array<PunctualLight, LIGHT_COUNT_MAX>,
+}
+
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var env_skybox: texture_cube<f32>;
 @group(0) @binding(2) var env_irradiance: texture_cube<f32>;
@@ -24,4 +48,5 @@ struct Frame {
 @group(0) @binding(7) var hdr_color: texture_2d<f32>;
 @group(0) @binding(8) var env_sheen: texture_cube<f32>;
 @group(0) @binding(9) var lut_charlie: texture_2d<f32>;
+@group(0) @binding(10) var<uniform> lights: Lights;
 @group(0) @binding(11) var scene_color: texture_2d<f32>;

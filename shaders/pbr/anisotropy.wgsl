@@ -1,14 +1,21 @@
-// Brushed surfaces under the environment. KHR_materials_anisotropy.
+// Brushed surfaces. KHR_materials_anisotropy.
 
 import lib::anisotropy::anisotropic_normal;
 import lib::material::texture_coordinate;
+import lib::sampling::orthonormal_basis;
 import lib::vector::normalize_or;
 import super::interface::{base_color_sampler, material, Varying};
 
 @group(1) @binding(27) var anisotropy_texture: texture_2d<f32>;
 
-// The normal that mirror directions are taken at; `normal` itself where the mesh has no tangents.
-fn brushed_normal(in: Varying, normal: vec3f, view: vec3f, perceptual_roughness: f32) -> vec3f {
+// The frame that the surface is brushed in.
+struct Brush {
+    // Tangent along the brush, bitangent, normal; any frame around the normal where the mesh has no tangents.
+    frame: mat3x3f,
+    strength: f32,
+}
+
+fn brush(in: Varying, normal: vec3f) -> Brush {
     let uv = texture_coordinate(material.anisotropy_uv_u, material.anisotropy_uv_v, in.uv0, in.uv1);
     // Red and green hold the brush's direction in the tangent frame, blue how strong it is.
     let texel = textureSample(anisotropy_texture, base_color_sampler, uv);
@@ -18,6 +25,14 @@ fn brushed_normal(in: Varying, normal: vec3f, view: vec3f, perceptual_roughness:
     let t = in.tangent.xyz;
     let b = in.tangent.w * cross(in.normal, t);
     let across = normalize_or(cross(normal, along.x * t + along.y * b), vec3f(0.0));
+    if dot(across, across) == 0.0 {
+        return Brush(orthonormal_basis(normal), 0.0);
+    }
     let strength = saturate(material.anisotropy_strength * texel.b);
-    return anisotropic_normal(normal, across, view, strength, perceptual_roughness);
+    return Brush(mat3x3f(cross(across, normal), across, normal), strength);
+}
+
+// The normal that mirror directions are taken at.
+fn brushed_normal(brush: Brush, view: vec3f, perceptual_roughness: f32) -> vec3f {
+    return anisotropic_normal(brush.frame[2], brush.frame[1], view, brush.strength, perceptual_roughness);
 }

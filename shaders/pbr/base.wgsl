@@ -1,10 +1,11 @@
-// The metallic-roughness base under the environment alone, with what shines through it. glTF 2.0, appendix B.
+// The metallic-roughness base under the environment and the scene's own lights, with what shines through it. glTF 2.0, appendix B.
 
 import lib::brdf::alpha2_filtered;
 import lib::environment::{dominant_direction, ggx_albedo, ggx_scale_bias, irradiance_over_pi, specular_radiance};
 @if(occlusion) import lib::material::specular_occlusion;
 import lib::vector::max_component;
-@if(diffuse_transmission) import super::diffuse_transmission::{light_from_behind, Scattering};
+@if(anisotropy && punctual_lights) import super::anisotropy::Brush;
+@if(diffuse_transmission) import super::diffuse_transmission::Scattering;
 @if(transmission && dispersion) import super::dispersion::dispersed_radiance;
 @if(iridescence) import super::iridescence::{Film, iridescent_f0};
 @if(transmission && !dispersion) import super::transmission::transmitted_radiance;
@@ -19,6 +20,7 @@ struct Base {
     normal: vec3f,
     // What mirror directions are taken at.
     @if(anisotropy) mirror_normal: vec3f,
+    @if(anisotropy && punctual_lights) brush: Brush,
     view: vec3f,
     occlusion: f32,
     @if(transmission) entry: Entry,
@@ -29,6 +31,20 @@ struct Base {
     @if(diffuse_transmission) metallic: f32,
     @if(diffuse_transmission) scattering: Scattering,
     @if(iridescence) film: Film,
+    @if(punctual_lights) direct: Direct,
+}
+
+// What punctual lights make of the base, before its colours.
+@if(punctual_lights)
+struct Direct {
+    // What a white Lambert surface radiates: irradiance over π.
+    irradiance_over_pi: vec3f,
+    // The same from behind.
+    @if(diffuse_transmission) behind_over_pi: vec3f,
+    // Radiance that the specular layer reflects, its Fresnel term included.
+    specular: vec3f,
+    // Radiance that a clear wall lets through from behind.
+    @if(transmission) through: vec3f,
 }
 
 // Perceptual roughness that also covers how the normal turns within the pixel.
@@ -48,20 +64,27 @@ fn base_radiance(base: Base) -> vec3f {
     let direction = dominant_direction(base.normal, r, roughness);
     var specular = albedo.single * specular_radiance(direction, roughness);
     @if(occlusion) specular *= specular_occlusion(n_dot_v, base.occlusion, roughness * roughness);
-    let irradiance = irradiance_over_pi(base.normal) * base.occlusion;
+    var irradiance = irradiance_over_pi(base.normal) * base.occlusion;
+    @if(punctual_lights) {
+        specular += base.direct.specular;
+        irradiance += base.direct.irradiance_over_pi;
+    }
     // What the specular layer left over. Its strongest channel counts, so that a coloured specular does
     // not tint the diffuse with its complement (KHR_materials_specular).
     let left = 1.0 - max_component(albedo.single + albedo.multiple);
     let below = base.diffuse_color * left;
     var diffuse = below * irradiance;
     @if(diffuse_transmission) {
-        var behind = light_from_behind(base.scattering, base.normal, left * (1.0 - base.metallic));
+        var irradiance_behind = irradiance_over_pi(-base.normal);
+        @if(punctual_lights) irradiance_behind += base.direct.behind_over_pi;
+        var behind = left * (1.0 - base.metallic) * base.scattering.color * irradiance_behind;
         @if(volume) behind *= base.transmittance;
         diffuse = mix(diffuse, behind, base.scattering.share);
     }
     @if(transmission) {
-        @if(dispersion) let behind = dispersed_radiance(base.entry, base.ior);
-        @else let behind = transmitted_radiance(base.entry, base.ior);
+        @if(dispersion) var behind = dispersed_radiance(base.entry, base.ior);
+        @else var behind = transmitted_radiance(base.entry, base.ior);
+        @if(punctual_lights) behind += base.direct.through;
         @if(volume) let through = behind * base.transmittance;
         @else let through = behind;
         diffuse = mix(diffuse, below * through, base.transmission);

@@ -1,6 +1,5 @@
 // Leaves, paper, wax: light that comes through diffusely. KHR_materials_diffuse_transmission.
 
-import lib::environment::irradiance_over_pi;
 import lib::material::texture_coordinate;
 import super::interface::{base_color_sampler, material, Varying};
 
@@ -25,9 +24,4 @@ fn scattering(in: Varying) -> Scattering {
     let color_texel = textureSample(diffuse_transmission_color_texture, base_color_sampler, color_uv);
     let share = saturate(material.diffuse_transmission_factor * texel.a);
     return Scattering(share, saturate(material.diffuse_transmission_color_factor * color_texel.rgb));
-}
-
-// What comes from behind. `weight` is what the specular layer and the metal leave of white.
-fn light_from_behind(scattering: Scattering, normal: vec3f, weight: f32) -> vec3f {
-    return weight * scattering.color * irradiance_over_pi(-normal);
 }

@@ -1,6 +1,6 @@
 // A thin film on the base. KHR_materials_iridescence.
 
-import lib::brdf::f0_of_schlick;
+import lib::brdf::{f0_of_schlick, f_schlick};
 import lib::iridescence::f_iridescence;
 import lib::material::texture_coordinate;
 import super::interface::{base_color_sampler, material, Varying};
@@ -25,6 +25,12 @@ fn film(in: Varying) -> Film {
     let texel = textureSample(iridescence_thickness_texture, base_color_sampler, thickness_uv);
     let thickness_nm = mix(material.iridescence_thickness_minimum, material.iridescence_thickness_maximum, texel.g);
     return Film(saturate(weight), thickness_nm);
+}
+
+// The film's reflectance where light comes from one direction.
+fn iridescent_reflectance(film: Film, f0: vec3f, f90: f32, v_dot_h: f32) -> vec3f {
+    let reflectance = f_iridescence(v_dot_h, f0, material.iridescence_ior, film.thickness_nm);
+    return mix(f_schlick(f0, f90, v_dot_h), reflectance, film.weight);
 }
 
 // The f0 with which Schlick's term gives the film's reflectance at this view: the split sum takes it from there.

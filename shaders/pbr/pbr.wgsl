@@ -1,4 +1,4 @@
-// The metallic-roughness material of glTF 2.0 under image-based light, with the effects that a scene calls
+// The metallic-roughness material of glTF 2.0 under image-based light and punctual lights, with the effects that a scene calls
 // for. Docs: docs/shader-interface.md. Every effect stands under its feature, so a variant declares, reads
 // and computes nothing that its scene does not use. `unlit` needs no other effect than those of colour and alpha.
 
@@ -7,12 +7,15 @@ import lib::frame::frame;
 import lib::material::texture_coordinate;
 @if(normal_map && !unlit) import lib::material::{mapped_normal, TangentFrame};
 import lib::vector::normalize_or;
-@if(anisotropy && !unlit) import super::anisotropy::brushed_normal;
+@if(anisotropy && !unlit) import super::anisotropy::{brush, brushed_normal};
 @if(!unlit) import super::base::{Base, base_radiance, filtered_roughness};
 @if(clearcoat && !unlit) import super::clearcoat::{coat, under_coat};
 @if(diffuse_transmission && !unlit) import super::diffuse_transmission::scattering;
 import super::interface::{base_color_sampler, draw, material, Varying, Vertex};
 @if(iridescence && !unlit) import super::iridescence::film;
+@if(punctual_lights && !unlit) import super::punctual::direct_light;
+@if(clearcoat && punctual_lights && !unlit) import super::punctual::direct_coat;
+@if(punctual_lights && sheen && !unlit) import super::punctual::direct_sheen;
 @if(sheen && !unlit) import super::sheen::{sheen, under_sheen};
 @if(specular && !unlit) import super::specular::dielectric_reflectance;
 @if(transmission && !unlit) import super::transmission::transmission;
@@ -99,7 +102,9 @@ fn base_layer(in: Varying, color: vec3f, geometric_normal: vec3f, facing: f32, v
     base.perceptual_roughness = filtered_roughness(metallic_roughness.y, geometric_normal);
     base.normal = facing * geometric_normal;
     @if(normal_map && !unlit) base.normal = facing * base_normal(in);
-    @if(anisotropy) base.mirror_normal = brushed_normal(in, base.normal, view, base.perceptual_roughness);
+    @if(anisotropy) let brush = brush(in, base.normal);
+    @if(anisotropy) base.mirror_normal = brushed_normal(brush, view, base.perceptual_roughness);
+    @if(anisotropy && punctual_lights) base.brush = brush;
     base.view = view;
     base.occlusion = 1.0;
     @if(occlusion && !unlit) base.occlusion = ambient_occlusion(in);
@@ -119,6 +124,7 @@ fn base_layer(in: Varying, color: vec3f, geometric_normal: vec3f, facing: f32, v
     @if(diffuse_transmission) base.metallic = metallic;
     @if(diffuse_transmission) base.scattering = scattering(in);
     @if(iridescence) base.film = film(in);
+    @if(punctual_lights) base.direct = direct_light(base, in.world_position);
     return base;
 }
 
@@ -129,9 +135,17 @@ fn shade(in: Varying, color: vec3f, facing: f32) -> vec3f {
     let view = normalize_or(frame.camera_position - in.world_position, geometric_normal);
     let base = base_layer(in, color, geometric_normal, facing, view);
     var radiance = base_radiance(base);
-    @if(sheen && !unlit) radiance = under_sheen(radiance, sheen(in), base.normal, view, base.occlusion);
+    @if(sheen && !unlit) {
+        let sheen = sheen(in);
+        radiance = under_sheen(radiance, sheen, base.normal, view, base.occlusion);
+        @if(punctual_lights) radiance += direct_sheen(sheen, base.normal, view, in.world_position);
+    }
     @if(emission && !unlit) radiance += emission(in);
-    @if(clearcoat && !unlit) radiance = under_coat(radiance, coat(in, geometric_normal, facing), view, base.occlusion);
+    @if(clearcoat && !unlit) {
+        let coat = coat(in, geometric_normal, facing);
+        radiance = under_coat(radiance, coat, view, base.occlusion);
+        @if(punctual_lights) radiance += direct_coat(coat, view, in.world_position);
+    }
     return radiance;
 }
 @else

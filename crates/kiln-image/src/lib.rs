@@ -13,6 +13,7 @@
 //! Not here: what a map means (`kiln-bake`), directions and transforms (`kiln-sphere`), files (`kiln-project`).
 
 pub mod colour;
+pub mod compare;
 mod container;
 pub mod cube_layout;
 mod decode;

@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use kiln_gpu::Gpu;
-use kiln_scene::Material;
+use kiln_scene::{Light, Material, Scene};
 use wgpu::util::{BufferInitDescriptor, DeviceExt as _};
 
+use crate::lights;
 use crate::own::OwnGroup;
 use crate::parameter::ParameterValues;
 use crate::prepare::Environment;
@@ -20,6 +21,8 @@ pub(crate) struct FrameBinding {
     group: Option<wgpu::BindGroup>,
     own: Option<Arc<OwnGroup>>,
     block: Option<(wgpu::Buffer, Bound)>,
+    /// With how many fit.
+    lights: Option<(wgpu::Buffer, usize)>,
 }
 
 impl FrameBinding {
@@ -32,9 +35,14 @@ impl FrameBinding {
     ) -> Self {
         let frame = program.groups[0].iter().find(|bound| bound.slot == Slot::Frame);
         let block = frame.map(|bound| (uniform_buffer(gpu, bound, Vec::new()), bound.clone()));
+        let lights = program.groups[0].iter().find_map(|bound| {
+            let capacity = bound.light_capacity()?;
+            Some((uniform_buffer(gpu, bound, Vec::new()), capacity))
+        });
         let resource = |bound: &Bound| {
             let view = match bound.slot {
                 Slot::Frame => return block.as_ref().map(|(buffer, _)| buffer.as_entire_binding()),
+                Slot::Lights => return lights.as_ref().map(|(buffer, _)| buffer.as_entire_binding()),
                 Slot::EnvSampler | Slot::LutSampler => {
                     return Some(wgpu::BindingResource::Sampler(&environment.sampler));
                 }
@@ -50,7 +58,15 @@ impl FrameBinding {
             view.map(wgpu::BindingResource::TextureView)
         };
         let group = create_group(gpu, program, 0, resource);
-        FrameBinding { group, own: program.own_group.clone(), block }
+        FrameBinding { group, own: program.own_group.clone(), block, lights }
+    }
+
+    /// Writes the lights as they are in this frame. Those beyond the room that the shader has are left out, the weakest first.
+    pub fn write_lights(&self, gpu: &Gpu, scene: &Scene, lights: &[Light]) {
+        if let Some((buffer, capacity)) = &self.lights {
+            let drawn = lights::strongest(lights, scene, *capacity);
+            gpu.queue.write_buffer(buffer, 0, &lights::block(&drawn));
+        }
     }
 
     /// Sets groups 0 and 3.

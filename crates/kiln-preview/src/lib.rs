@@ -33,6 +33,7 @@ mod draw_list;
 mod frame_watcher;
 mod headless;
 mod keeper;
+mod lights;
 mod live_picture;
 mod mip;
 mod neutral;

@@ -306,6 +306,14 @@ impl Preparer {
         let faulty =
             |fault: String| Diagnostic::error("the scene cannot be bound to its shaders").with_note(fault);
         report.diagnostics.extend(fault.map(faulty));
+        let count = scene.scene.lights.len();
+        let capacities = found.values().flatten().filter_map(|program| program.light_capacity());
+        if let Some(capacity) = capacities.min().filter(|capacity| count > *capacity) {
+            report.notes.push(format!(
+                "{count} punctual lights: the {} weakest are left out, `shader/{shader}` has room for {capacity}",
+                count - capacity
+            ));
+        }
         draws
     }
 

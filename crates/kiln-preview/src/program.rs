@@ -9,6 +9,7 @@ use kiln_scene::Vertex;
 use kiln_shader::{Binding, BindingKind, Member, Override, Reflection, Stage};
 
 use crate::keeper::make_checked;
+use crate::lights;
 use crate::own::{OwnGroup, OwnTextures};
 use crate::parameter::{OfferedParameter, ParameterValues, offered};
 use crate::slot::Slot;
@@ -67,6 +68,12 @@ impl Bound {
     pub fn reads_time(&self) -> bool {
         let members = self.block.as_ref().map_or(&[][..], |(_, members)| members);
         self.slot == Slot::Frame && members.iter().any(|member| member.name == "time_s")
+    }
+
+    /// How many lights fit, if it is their block.
+    pub fn light_capacity(&self) -> Option<usize> {
+        let (size_bytes, members) = self.block.as_ref().filter(|_| self.slot == Slot::Lights)?;
+        lights::capacity(*size_bytes, members).ok()
     }
 }
 
@@ -182,6 +189,11 @@ impl Program {
     /// Whether it reads what is drawn before it.
     pub fn reads_scene_color(&self) -> bool {
         self.groups[0].iter().any(|bound| bound.slot == Slot::SceneColor)
+    }
+
+    /// How many punctual lights it draws, if it draws any.
+    pub fn light_capacity(&self) -> Option<usize> {
+        self.groups[0].iter().find_map(Bound::light_capacity)
     }
 
     fn create_pipeline(
@@ -347,7 +359,7 @@ fn check_binding(shader: &str, role: Role, binding: &Binding) -> Result<Slot, Di
                 "names that can be bound are listed in docs/shader-interface.md; your own stand in group 3",
             ));
     };
-    let is_of_material = [1, 2].contains(&slot.group()) || slot == Slot::SceneColor;
+    let is_of_material = [1, 2].contains(&slot.group()) || matches!(slot, Slot::Lights | Slot::SceneColor);
     if is_of_material && role != Role::Material {
         return Err(Diagnostic::error(format!("`{shader}` declares `{name}`, which only materials have")));
     }
@@ -382,6 +394,12 @@ fn check_members(
     }
     if slot == Slot::Params {
         return Ok(());
+    }
+    if slot == Slot::Lights {
+        let declares = |expected| format!("`{shader}` declares `{block}` otherwise than as {expected}");
+        return lights::capacity(size_bytes, members)
+            .map(drop)
+            .map_err(|expected| Diagnostic::error(declares(expected)));
     }
     // A leading underscore marks padding: it stays zero.
     for member in members.iter().filter(|member| !member.name.starts_with('_')) {
@@ -459,12 +477,14 @@ fn binding_type(bound: &Bound) -> wgpu::BindingType {
         multisampled: false,
     };
     match bound.slot {
-        Slot::Frame | Slot::Material | Slot::Draw | Slot::Params => wgpu::BindingType::Buffer {
-            ty: wgpu::BufferBindingType::Uniform,
-            // Draws share one buffer, each at its own offset.
-            has_dynamic_offset: bound.slot == Slot::Draw,
-            min_binding_size: bound.block.as_ref().and_then(|(size, _)| u64::from(*size).try_into().ok()),
-        },
+        Slot::Frame | Slot::Lights | Slot::Material | Slot::Draw | Slot::Params => {
+            wgpu::BindingType::Buffer {
+                ty: wgpu::BufferBindingType::Uniform,
+                // Draws share one buffer, each at its own offset.
+                has_dynamic_offset: bound.slot == Slot::Draw,
+                min_binding_size: bound.block.as_ref().and_then(|(size, _)| u64::from(*size).try_into().ok()),
+            }
+        }
         Slot::EnvSkybox | Slot::EnvIrradiance | Slot::EnvSpecular | Slot::EnvSheen => {
             texture(wgpu::TextureViewDimension::Cube)
         }

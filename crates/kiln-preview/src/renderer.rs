@@ -143,6 +143,9 @@ impl Renderer {
         for frame in shown.background.iter().chain(&shown.programs).chain([&shown.tonemap]) {
             frame.write(&self.gpu, &values, &view.parameters);
         }
+        if let Some(scene) = shown.prepared.scene.as_ref().map(|scene| &scene.scene) {
+            shown.programs.iter().for_each(|frame| frame.write_lights(&self.gpu, scene, &scene.lights));
+        }
         let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let eye = values.camera_position;
         match (&shown.scene_color, self.downsampler.get()) {

@@ -114,6 +114,8 @@ pub(crate) enum Slot {
     SceneColor,
     EnvSampler,
     LutSampler,
+    /// The scene's own.
+    Lights,
     Material,
     MaterialTexture(Map),
     MaterialSampler(Map),
@@ -126,7 +128,7 @@ pub(crate) enum Slot {
     OwnSampler,
 }
 
-const FIXED: [(Slot, &str); 14] = [
+const FIXED: [(Slot, &str); 15] = [
     (Slot::Frame, "frame"),
     (Slot::EnvSkybox, "env_skybox"),
     (Slot::EnvIrradiance, "env_irradiance"),
@@ -138,6 +140,7 @@ const FIXED: [(Slot, &str); 14] = [
     (Slot::SceneColor, "scene_color"),
     (Slot::EnvSampler, "env_sampler"),
     (Slot::LutSampler, "lut_sampler"),
+    (Slot::Lights, "lights"),
     (Slot::Material, "material"),
     (Slot::Draw, "draw"),
     (Slot::Params, "params"),
@@ -190,7 +193,7 @@ impl Slot {
     /// What a shader must declare it as.
     pub fn expects(self) -> &'static str {
         match self {
-            Slot::Frame | Slot::Material | Slot::Draw | Slot::Params => "uniform",
+            Slot::Frame | Slot::Lights | Slot::Material | Slot::Draw | Slot::Params => "uniform",
             Slot::EnvSkybox | Slot::EnvIrradiance | Slot::EnvSpecular | Slot::EnvSheen => "texture_cube<f32>",
             Slot::LutGgx
             | Slot::LutCharlie

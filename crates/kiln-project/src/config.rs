@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use kiln_diagnostic::Diagnostic;
-use kiln_scene::{Effect, EffectOverrides};
+use kiln_scene::{Effect, EffectOverrides, SpecularGlossinessAs};
 use kiln_shader::{Language, Program};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -21,6 +21,8 @@ pub const PROJECT_VERSION: usize = 1;
 pub struct Project {
     /// For window titles and status lines.
     pub name: String,
+    /// Folders outside the project whose files scenes may refer to; see [`kiln_scene::PackOptions`].
+    pub allowed_folders: Vec<String>,
     /// `[env.NAME]`.
     pub envs: BTreeMap<String, EnvConfig>,
     /// `[lut.NAME]`.
@@ -48,6 +50,8 @@ pub struct SceneConfig {
     pub env: String,
     /// Name of a material shader.
     pub shader: String,
+    /// How materials of `KHR_materials_pbrSpecularGlossiness` are drawn.
+    pub specular_glossiness: SpecularGlossinessAs,
 }
 
 /// A shader.
@@ -114,6 +118,7 @@ pub fn parse_project(text: &str) -> (Project, Vec<Diagnostic>) {
     }
     let mut project = Project {
         name: "kiln".to_owned(),
+        allowed_folders: Vec::new(),
         envs: BTreeMap::new(),
         luts: BTreeMap::new(),
         scenes: BTreeMap::new(),
@@ -146,6 +151,7 @@ fn read_root<'a>(document: &mut Document<'a>, root: &DeTable<'a>, project: &mut 
                 if let Some(name) = section.text("name") {
                     project.name = name;
                 }
+                project.allowed_folders = read_allowed_folders(section);
             }),
             "output" => read_single(document, "output", value, |section| {
                 if let Some(dir) = read_output_dir(section) {
@@ -258,6 +264,23 @@ fn read_output_dir(section: &mut Section) -> Option<String> {
     Some(dir)
 }
 
+/// Folders that glTF files may refer to though they lie outside the project.
+fn read_allowed_folders(section: &mut Section) -> Vec<String> {
+    let mut folders = Vec::new();
+    for folder in section.texts("allow_folders").unwrap_or_default() {
+        let path = normalised(&folder);
+        if leaves_project(&path) {
+            folders.push(path);
+            continue;
+        }
+        let help = "name folders outside, as `allow_folders = [\"../library\", \"/srv/assets\"]`";
+        let message =
+            format!("`{folder}` in `allow_folders` lies in the project, where all may be referred to");
+        section.fail(message, section.place("allow_folders"), Some(help.to_owned()));
+    }
+    folders
+}
+
 /// A source's path, in the one spelling by which the rest knows it.
 fn read_source(section: &mut Section, example: &'static str) -> String {
     normalised(&section.required_text("source", example))
@@ -288,6 +311,15 @@ fn read_scene(section: &mut Section, envs: &[String], shaders: &[String]) -> Sce
     SceneConfig {
         env: reference("env", envs, &first_env),
         shader: reference("shader", shaders, "pbr"),
+        specular_glossiness: section
+            .choice(
+                "specular_glossiness",
+                &[
+                    ("metallic_roughness", SpecularGlossinessAs::MetallicRoughness),
+                    ("specular", SpecularGlossinessAs::Specular),
+                ],
+            )
+            .unwrap_or_default(),
         source: read_source(section, "scenes/scene.gltf"),
     }
 }
@@ -475,16 +507,20 @@ fn is_identifier(name: &str) -> bool {
 /// What leaves the project is refused: what is read may be shown.
 fn check_inside(section: &mut Section, key: &'static str, paths: &[String]) {
     for path in paths {
-        let mut depth = 0_i32;
-        let mut goes_above = |part: &str| {
-            depth += if part == ".." { -1 } else { 1 };
-            depth < 0
-        };
-        let leaves = Path::new(path).is_absolute() || path.split('/').any(&mut goes_above);
-        if leaves {
+        if leaves_project(path) {
             let help = "copy or link it into the project's folder";
             let message = format!("`{path}` in `{key}` lies outside the project");
             section.fail(message, section.place(key), Some(help.to_owned()));
         }
     }
+}
+
+/// Whether a path, taken from the project's folder, leads out of it, links aside.
+pub(crate) fn leaves_project(path: &str) -> bool {
+    let mut depth = 0_i32;
+    let mut goes_above = |part: &str| {
+        depth += if part == ".." { -1 } else { 1 };
+        depth < 0
+    };
+    Path::new(path).is_absolute() || path.split('/').any(&mut goes_above)
 }

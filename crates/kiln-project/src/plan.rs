@@ -168,8 +168,7 @@ pub(crate) fn plan_project(
     let mut variants = shader::Variants::default();
     let mut scenes = Vec::new();
     for (name, config) in &project.scenes {
-        let overrides = &project.effects;
-        scenes.push(scene::plan_scene(&mut planner, engine, name, config, overrides, &mut variants)?);
+        scenes.push(scene::plan_scene(&mut planner, engine, &project, name, config, &mut variants)?);
     }
     let envs = env_demands(&project, &scenes);
     for (name, config) in &project.shaders {

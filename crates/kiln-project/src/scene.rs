@@ -1,19 +1,21 @@
 //! Actions of `[scene.NAME]`.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Arc;
 
 use kiln_build::{Action, ActionOutput, Engine, Error, Input, Tracker, little_memory};
 use kiln_diagnostic::{Diagnostic, has_errors};
-use kiln_scene::{MaterialEffects, variant_name};
+use kiln_scene::{MaterialEffects, PackOptions, Packed, pack_with, variant_name};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use crate::config::leaves_project;
 use crate::demand::overridden;
 use crate::environment::{command, failure};
 use crate::plan::{PartSpec, Planner, no_content, rank, unreadable};
 use crate::shader::Variants;
-use crate::{EffectOverrides, SceneConfig, SceneDemand};
+use crate::{Project, SceneConfig, SceneDemand};
 
 /// What a scan of a scene tells the planner.
 #[derive(Default, Serialize, Deserialize)]
@@ -23,25 +25,36 @@ struct SceneScan {
 }
 
 /// Version of the code behind both the scan and the action.
-const PACK_RECIPE: u32 = 6;
+const PACK_RECIPE: u32 = 7;
 
 /// Adds the actions and targets of one scene and notes the shader variants that it calls for.
 pub(crate) fn plan_scene(
     planner: &mut Planner,
     engine: &Engine,
+    project: &Project,
     name: &str,
     config: &SceneConfig,
-    overrides: &EffectOverrides,
     variants: &mut Variants,
 ) -> Result<SceneDemand, Error> {
-    let scan =
-        engine.scan("scene", PACK_RECIPE, &config.source, |tracker| scan_scene(&config.source, tracker))?;
+    let options = PackOptions {
+        allowed_folders: project.allowed_folders.clone(),
+        specular_glossiness: config.specular_glossiness,
+    };
+    let kind = format!("scene {}", json!(options));
+    let scan = engine
+        .scan(&kind, PACK_RECIPE, &config.source, |tracker| scan_scene(&options, &config.source, tracker))?;
+    // Where links lead is no content, so no scan can remember it.
+    let references = scan.looked_at.iter().map(|(path, _)| path).filter(|path| **path != config.source);
+    let astray: Vec<String> = references
+        .filter(|path| is_astray(engine.folder(), &options.allowed_folders, path))
+        .cloned()
+        .collect();
     let found = SceneScan::deserialize(&scan.found).unwrap_or_default();
     // While a scene cannot be read, what it last called for stays.
-    let materials = found.materials.or_else(|| last_materials(engine, name));
+    let materials = found.materials.filter(|_| astray.is_empty()).or_else(|| last_materials(engine, name));
     let is_known = materials.is_some();
     let materials: Vec<MaterialEffects> =
-        materials.iter().flatten().map(|material| overridden(overrides, material)).collect();
+        materials.iter().flatten().map(|material| overridden(&project.effects, material)).collect();
     for material in &materials {
         let features = material.effects.iter().map(|effect| effect.name().to_owned());
         variants.ask(&config.shader, features.collect());
@@ -50,14 +63,16 @@ pub(crate) fn plan_scene(
         scan.looked_at.iter().map(|(path, digest)| Input::Source { path: path.clone(), digest: *digest });
     let (source, files) = (config.source.clone(), scan.clone());
     let unreadable = unreadable(engine, &source);
+    // Which folders are allowed shows in what was looked at; absolute ones have no place in a manifest.
+    let mut params = json!({
+        "source": source, "unreadable": unreadable, "specular_glossiness": config.specular_glossiness,
+    });
+    if !astray.is_empty() {
+        params["astray"] = json!(astray);
+    }
     let pack = planner.graph.add(Action {
         name: format!("pack scene/{name}"),
-        command: command(
-            "pack",
-            PACK_RECIPE,
-            json!({"source": source, "unreadable": unreadable}),
-            &["glb", "effects"],
-        ),
+        command: command("pack", PACK_RECIPE, params, &["glb", "effects"]),
         inputs: inputs.collect(),
         rank: rank::SCENE,
         memory: little_memory(),
@@ -66,9 +81,13 @@ pub(crate) fn plan_scene(
             for (index, (path, _)) in files.looked_at.iter().enumerate() {
                 contents.insert(path.as_str(), inputs.bytes(index)?);
             }
+            if !astray.is_empty() {
+                let diagnostics = astray.iter().map(|path| led_astray(path)).collect();
+                return Ok(ActionOutput { diagnostics, ..ActionOutput::default() });
+            }
             let mut read = |path: &str| contents.get(path).cloned().flatten();
             Ok(match read(&source) {
-                Some(bytes) => pack_scene(&source, &bytes, &mut read),
+                Some(bytes) => pack_scene(pack_with(&options, &source, &bytes, &mut read)),
                 None => failure(no_content("scene", unreadable.as_deref())),
             })
         }),
@@ -91,15 +110,29 @@ fn last_materials(engine: &Engine, name: &str) -> Option<Vec<MaterialEffects>> {
 
 /// Reads the scene once to learn which files it consists of and which effects it calls for. What is wrong
 /// with it is said by the action, which reads the same files.
-fn scan_scene(source: &str, tracker: &mut Tracker) -> (Value, Vec<Diagnostic>) {
+fn scan_scene(options: &PackOptions, source: &str, tracker: &mut Tracker) -> (Value, Vec<Diagnostic>) {
     let Some(bytes) = tracker.read(source) else { return (json!(SceneScan::default()), Vec::new()) };
-    let packed = kiln_scene::pack(source, &bytes, &mut |path| tracker.read(path));
+    let packed = pack_with(options, source, &bytes, &mut |path| tracker.read(path));
     let is_sound = packed.glb.is_some() && !has_errors(&packed.diagnostics);
     (json!(SceneScan { materials: is_sound.then_some(packed.effects) }), Vec::new())
 }
 
-fn pack_scene(source: &str, bytes: &[u8], read: &mut dyn FnMut(&str) -> Option<Arc<[u8]>>) -> ActionOutput {
-    let packed = kiln_scene::pack(source, bytes, read);
+/// Whether a path outside the project that may be referred to leads on, through a link, to a place that may not. Links
+/// in the project are its owner's, who may link whatever there is.
+fn is_astray(folder: &Path, allowed_folders: &[String], path: &str) -> bool {
+    let Some(place) = leaves_project(path).then(|| folder.join(path).canonicalize().ok()).flatten() else {
+        return false;
+    };
+    let mut folders = allowed_folders.iter().filter_map(|allowed| folder.join(allowed).canonicalize().ok());
+    !place.starts_with(folder) && !folders.any(|allowed| place.starts_with(allowed))
+}
+
+fn led_astray(path: &str) -> Diagnostic {
+    Diagnostic::error(format!("`{path}` is a link that leads out of the folders that the project allows"))
+        .with_help("copy the file to where the link is, or allow the folder it leads to in `allow_folders` of [project]")
+}
+
+fn pack_scene(packed: Packed) -> ActionOutput {
     let Some(glb) = packed.glb.filter(|_| !has_errors(&packed.diagnostics)) else {
         return ActionOutput { diagnostics: packed.diagnostics, ..ActionOutput::default() };
     };

@@ -1,8 +1,10 @@
 //! Typed, bounds-checked reading of accessors (glTF 2.0, section 3.6).
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::schema::{Accessor, Root, Sparse};
+use crate::uri::References;
 use crate::{SceneError, limits, uri};
 
 /// Bytes of a buffer, from wherever they came.
@@ -26,21 +28,27 @@ impl Blob<'_> {
     }
 }
 
-/// Fetches every buffer; all that fail are reported, not the first alone.
+/// Fetches every buffer, and a file that several name once; all that fail are reported, not the first alone.
 pub(crate) fn fetch_buffers<'a>(
-    file: &str,
+    references: &mut References<'_>,
     root: &Root,
     bin: Option<&'a [u8]>,
-    resolve: &mut dyn FnMut(&str) -> Option<Arc<[u8]>>,
 ) -> Result<Vec<Blob<'a>>, Vec<SceneError>> {
     let (mut blobs, mut errors) = (Vec::new(), Vec::new());
+    let mut files: BTreeMap<&str, Arc<[u8]>> = BTreeMap::new();
     for (index, buffer) in root.buffers.iter().enumerate() {
         let pointer = format!("/buffers/{index}");
         let blob = match (&buffer.uri, bin) {
-            (Some(uri), _) => fetch_uri(file, &format!("{pointer}/uri"), uri, resolve),
+            (Some(uri), _) => match files.get(uri.as_str()) {
+                Some(known) => Ok(Blob::Shared(known.clone())),
+                None => fetch_uri(references, &format!("{pointer}/uri"), uri),
+            },
             (None, Some(bin)) if index == 0 => Ok(Blob::Chunk(bin)),
             (None, _) => Ok(Blob::Absent),
         };
+        if let (Some(uri), Ok(Blob::Shared(bytes))) = (&buffer.uri, &blob) {
+            files.insert(uri, bytes.clone());
+        }
         match blob.and_then(|blob| check_length(blob, buffer.byte_length, &pointer)) {
             Ok(blob) => blobs.push(blob),
             Err(error) => errors.push(error),
@@ -61,17 +69,16 @@ fn check_length<'a>(blob: Blob<'a>, wanted: u64, pointer: &str) -> Result<Blob<'
 
 /// Bytes behind a `data:` or file URI.
 pub(crate) fn fetch_uri<'a>(
-    file: &str,
+    references: &mut References<'_>,
     pointer: &str,
     uri: &str,
-    resolve: &mut dyn FnMut(&str) -> Option<Arc<[u8]>>,
 ) -> Result<Blob<'a>, SceneError> {
     if uri.starts_with("data:") {
         let bytes = uri::data_payload(uri);
         return bytes.map(Blob::Owned).ok_or_else(|| SceneError::new(pointer, "the data URI is malformed"));
     }
-    let (path, _) = uri::resolve(file, pointer, uri)?;
-    resolve(&path).map(Blob::Shared).ok_or_else(|| {
+    let (path, _) = uri::resolve(references.file, references.allowed_folders, pointer, uri)?;
+    (references.read)(&path).map(Blob::Shared).ok_or_else(|| {
         SceneError::new(pointer, format!("`{}` was not found", uri::shorten(uri)))
             .with_help(format!("put the file at {path} or correct the URI"))
     })

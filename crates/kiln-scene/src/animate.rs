@@ -22,6 +22,9 @@ pub(crate) struct Motion {
 /// Smallest and largest value of each component of an animated property.
 pub(crate) type Ranges = Vec<(MaterialProperty, Vec<[f32; 2]>)>;
 
+/// The same of a light.
+pub(crate) type LightRanges = Vec<(LightProperty, Vec<[f32; 2]>)>;
+
 pub(crate) fn read(data: &Data<'_>) -> Motion {
     let mut reader = Reader {
         data,
@@ -68,6 +71,17 @@ impl Motion {
         for (target, curve) in self.targets() {
             if let Target::Material { material, property } = target {
                 ranges.entry(material).or_default().push((property, curve.range()));
+            }
+        }
+        ranges
+    }
+
+    /// What the animations do to each light.
+    pub fn light_ranges(&self) -> BTreeMap<usize, LightRanges> {
+        let mut ranges: BTreeMap<usize, LightRanges> = BTreeMap::new();
+        for (target, curve) in self.targets() {
+            if let Target::Light { light, property } = target {
+                ranges.entry(light).or_default().push((property, curve.range()));
             }
         }
         ranges

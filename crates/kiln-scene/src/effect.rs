@@ -6,7 +6,7 @@ use crate::{Effect, EffectSet};
 
 impl Effect {
     /// Every effect, in the order of their names.
-    pub const ALL: [Effect; 19] = [
+    pub const ALL: [Effect; 20] = [
         Effect::AlphaBlend,
         Effect::AlphaMask,
         Effect::Anisotropy,
@@ -19,6 +19,7 @@ impl Effect {
         Effect::Morph,
         Effect::NormalMap,
         Effect::Occlusion,
+        Effect::PunctualLights,
         Effect::Sheen,
         Effect::Skin,
         Effect::Specular,
@@ -43,6 +44,7 @@ impl Effect {
             Effect::Morph => "morph",
             Effect::NormalMap => "normal_map",
             Effect::Occlusion => "occlusion",
+            Effect::PunctualLights => "punctual_lights",
             Effect::Sheen => "sheen",
             Effect::Skin => "skin",
             Effect::Specular => "specular",

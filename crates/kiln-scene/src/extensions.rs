@@ -1,7 +1,7 @@
 //! Which glTF extensions are known, and what is said about the others.
 
-use crate::SceneError;
 use crate::schema::{Material, Root};
+use crate::{SceneError, SpecularGlossinessAs};
 
 /// Drawn, or harmless to a picture. Formats of textures that are absent may have a fallback that is drawn: a file
 /// that requires them has none.
@@ -81,14 +81,18 @@ pub(crate) fn file_notes(root: &Root) -> Vec<String> {
 }
 
 /// What a drawn material asks for and does not get as the specification says.
-pub(crate) fn material_notes(name: &str, material: &Material) -> Vec<String> {
+pub(crate) fn material_notes(
+    name: &str,
+    material: &Material,
+    specular_glossiness: SpecularGlossinessAs,
+) -> Vec<String> {
     let ext = &material.extensions;
-    if ext.unlit.is_some() {
+    if ext.unlit.is_some() || ext.specular_glossiness.is_none() {
         return Vec::new();
     }
-    let asked = [
-        (ext.specular_glossiness.is_some(), "specular-glossiness was converted to metallic-roughness"),
-    ];
-    let asked = asked.into_iter().filter(|(is_asked, _)| *is_asked);
-    asked.map(|(_, what)| format!("material `{name}`: {what}")).collect()
+    let model = match specular_glossiness {
+        SpecularGlossinessAs::MetallicRoughness => "metallic-roughness",
+        SpecularGlossinessAs::Specular => "KHR_materials_specular",
+    };
+    vec![format!("material `{name}`: specular-glossiness was converted to {model}")]
 }

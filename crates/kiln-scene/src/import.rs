@@ -1,7 +1,6 @@
 //! The one way from a document to a scene; [`crate::pack`] and [`crate::load`] both go it.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
 
 use glam::{DMat4, DVec3, Mat4};
 
@@ -16,10 +15,11 @@ use crate::material_table::{MaterialTable, Settled};
 use crate::movement::{Movement, movement, rest_weights};
 use crate::pose::{Binding, Pose, binding, is_singular, pose, vanishes};
 use crate::textures::TextureTable;
+use crate::uri::References;
 use crate::write::GENERATOR;
 use crate::{
-    Camera, Draw, Instance, Item, Light, LightReads, Scene, SceneError, Skin, conform, extensions, limits,
-    rig, schema, variants,
+    Camera, Draw, Instance, Item, Light, LightReads, Scene, SceneError, Skin, SpecularGlossinessAs, conform,
+    extensions, limits, rig, schema, variants,
 };
 
 #[path = "import_order.rs"]
@@ -46,20 +46,20 @@ pub(crate) struct Imported {
     pub faults: Vec<SceneError>,
 }
 
-pub(crate) type Resolve<'a> = &'a mut dyn FnMut(&str) -> Option<Arc<[u8]>>;
-
 /// Imports a document.
 ///
 /// # Errors
 /// All that is wrong at the first stage where something is wrong.
 pub(crate) fn import(
-    file: &str,
+    references: References<'_>,
+    specular_glossiness: SpecularGlossinessAs,
     document: &Document<'_>,
-    resolve: Resolve<'_>,
 ) -> Result<Imported, Vec<SceneError>> {
     let root = &document.root;
     extensions::check_required(root).map_err(|error| vec![error])?;
-    let buffers = fetch_buffers(file, root, document.bin, resolve)?;
+    let References { file, allowed_folders, read } = references;
+    let mut of_buffers = References { file, allowed_folders, read: &mut *read };
+    let buffers = fetch_buffers(&mut of_buffers, root, document.bin)?;
     let data = Data { root, buffers };
     let motion = animate::read(&data);
     let pose = pose(root, &motion.blinking()).map_err(|error| vec![error])?;
@@ -68,14 +68,14 @@ pub(crate) fn import(
     let mut faults = if is_pack { Vec::new() } else { conform::check(&document.json, &data) };
     // What is left out because of a fault is said there, and once.
     faults.retain(|fault| motion.warnings.iter().all(|warning| warning.pointer != fault.pointer));
-    let textures = TextureTable::new(file, &data, resolve);
+    let textures = TextureTable::new(References { file, allowed_folders, read }, &data);
     let movement = movement(root, &pose, &motion);
     let importer = Importer {
         data: &data,
         pose: &pose,
         hierarchy: hierarchy(root, &pose, &motion.nodes(), &movement.joints(root, &pose)),
         movement,
-        materials: MaterialTable::new(root, textures, motion.material_ranges()),
+        materials: MaterialTable::new(root, textures, motion.material_ranges(), specular_glossiness),
         motion,
         scene: Scene { variants: variants::names(root), ..Scene::default() },
         needs: Vec::new(),
@@ -184,11 +184,11 @@ impl Importer<'_, '_> {
             self.add_node(node)?;
         }
         for &node in &self.pose.hidden {
-            self.add_shape(node, false)?;
+            self.add_hidden(node)?;
         }
-        if !self.lights.is_empty() {
-            self.notes.push(format!("{} punctual lights are not drawn", self.lights.len()));
-        }
+        let light_ranges = self.motion.light_ranges();
+        let ranges = |index| light_ranges.get(&index).map_or(&[][..], Vec::as_slice);
+        self.lights.retain(|(_, found)| rig::ever_shines(&found.source, ranges(found.index)));
         let carried = &mut self.scene.carried;
         self.scene.draws = carry(self.draws, Item::Draw, carried);
         self.scene.hidden = carry(self.hidden, Item::Hidden, carried);
@@ -204,7 +204,7 @@ impl Importer<'_, '_> {
         self.scene.nodes = std::mem::take(&mut self.hierarchy.nodes);
         self.scene.bounds = world_bounds(&self.scene, &mut self.budget)?;
         let Settled { materials, flat, reads, textures, samplers, pictures, notes, mut warnings, moving } =
-            self.materials.settle(&mut self.scene);
+            self.materials.settle(&mut self.scene, !lights.is_empty());
         notes.into_iter().for_each(|note| self.notes.push(note));
         warnings.extend(self.motion.warnings);
         self.scene.materials = flat;
@@ -245,6 +245,16 @@ impl Importer<'_, '_> {
             self.lights.push((place, FoundLight { index: at.light, light, source, world }));
         }
         self.add_shape(index, true)
+    }
+
+    /// Adds the mesh of a node that is invisible at rest.
+    fn add_hidden(&mut self, index: usize) -> Result<(), SceneError> {
+        let node = &self.data.root.nodes[index];
+        if node.extensions.light.is_some() {
+            let name = node.name.clone().unwrap_or_else(|| format!("node {index}"));
+            self.notes.push(format!("the light of node `{name}` is invisible at rest and is left out"));
+        }
+        self.add_shape(index, false)
     }
 
     /// Adds a node's mesh; `shown` unless the node is invisible at rest.

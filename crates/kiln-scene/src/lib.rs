@@ -20,10 +20,11 @@ pub use effect::{EffectOverrides, variant_name};
 pub use error::SceneError;
 pub use images::decode_image;
 
-pub use pack::{LightReads, MaterialEffects, Packed, SceneSummary, load, pack};
+pub use pack::{LightReads, MaterialEffects, PackOptions, Packed, SceneSummary, load, pack, pack_with};
 pub use play::{Posed, PosedDraw, Sources};
 pub use property::{CameraProperty, LightProperty, MaterialProperty, TextureSlot};
 pub use scene::*;
+pub use specular_glossiness::SpecularGlossinessAs;
 pub use uri::{Uri, UriKind, external_uris};
 
 mod accessor;

@@ -10,8 +10,8 @@ use crate::prune::{Pruned, prune, retain_textures, settle};
 use crate::schema::{self, TextureInfo};
 use crate::textures::{Found, TextureTable, sampler};
 use crate::{
-    AlphaMode, ColorSpace, Effect, LightReads, Material, MaterialProperty, Scene, SceneError, Texture,
-    TextureRef, extensions, specular_glossiness,
+    AlphaMode, ColorSpace, Effect, LightReads, Material, MaterialProperty, Scene, SceneError,
+    SpecularGlossinessAs, Texture, TextureRef, extensions, specular_glossiness,
 };
 
 pub(crate) struct MaterialTable<'a, 'b> {
@@ -19,6 +19,7 @@ pub(crate) struct MaterialTable<'a, 'b> {
     textures: TextureTable<'a, 'b>,
     /// What animations do, by the file's material index.
     ranges: BTreeMap<usize, Ranges>,
+    specular_glossiness: SpecularGlossinessAs,
     /// Slot by the file's material index; the default material comes last.
     slots_by_index: BTreeMap<usize, usize>,
     slots: Vec<Slot>,
@@ -52,8 +53,10 @@ impl<'a, 'b> MaterialTable<'a, 'b> {
         root: &'a schema::Root,
         textures: TextureTable<'a, 'b>,
         ranges: BTreeMap<usize, Ranges>,
+        specular_glossiness: SpecularGlossinessAs,
     ) -> Self {
-        MaterialTable { root, textures, ranges, slots_by_index: BTreeMap::new(), slots: Vec::new() }
+        let (slots_by_index, slots) = (BTreeMap::new(), Vec::new());
+        MaterialTable { root, textures, ranges, specular_glossiness, slots_by_index, slots }
     }
 
     /// Number of a material in this table; read and pruned on first use. `None` is glTF's default material.
@@ -106,7 +109,7 @@ impl<'a, 'b> MaterialTable<'a, 'b> {
     }
 
     fn prepare(&mut self, mut material: schema::Material, name: String, ranges: Ranges, place: &str) -> Slot {
-        let mut notes = extensions::material_notes(&name, &material);
+        let mut notes = extensions::material_notes(&name, &material, self.specular_glossiness);
         let textures = &mut self.textures;
         let mut keep = |info: &mut TextureInfo, _: ColorSpace| {
             let set = uv_set(info);
@@ -123,7 +126,9 @@ impl<'a, 'b> MaterialTable<'a, 'b> {
             }
         }
         retain_textures(&mut material, &mut keep);
-        if let Err(reason) = specular_glossiness::convert(&mut material, &mut self.textures) {
+        let converted =
+            specular_glossiness::convert(&mut material, self.specular_glossiness, &mut self.textures);
+        if let Err(reason) = converted {
             notes.push(format!(
                 "material `{name}`: specular-glossiness textures were not converted: {reason}"
             ));
@@ -134,8 +139,8 @@ impl<'a, 'b> MaterialTable<'a, 'b> {
     }
 
     /// Drops what no primitive of the scene uses, decides the last effects, numbers the rest and gives the
-    /// scene its textures, images and material indices.
-    pub fn settle(mut self, scene: &mut Scene) -> Settled {
+    /// scene its textures, images and material indices. `is_lit` if the scene has lights of its own.
+    pub fn settle(mut self, scene: &mut Scene, is_lit: bool) -> Settled {
         let mut settled = Settled::default();
         let mut final_index = BTreeMap::new();
         let mut numbering = Numbering::default();
@@ -149,6 +154,9 @@ impl<'a, 'b> MaterialTable<'a, 'b> {
             let Some(colors) = used.reduce(Colors::and) else { continue };
             let Slot { name, pruned, notes, .. } = &mut self.slots[slot];
             settle(pruned, colors.any, colors.alpha_min, &|info| self.textures.range(info));
+            if is_lit && !pruned.effects.contains(&Effect::Unlit) {
+                pruned.effects.insert(Effect::PunctualLights);
+            }
             settled.notes.append(notes);
             let mut material = pruned.material.clone();
             retain_textures(&mut material, &mut |info, _| {

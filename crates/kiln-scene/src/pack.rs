@@ -7,7 +7,8 @@ use kiln_diagnostic::{Diagnostic, Severity};
 use serde::{Deserialize, Serialize};
 
 use crate::import::{Imported, import};
-use crate::{Effect, EffectSet, Scene, SceneError, document, write};
+use crate::uri::References;
+use crate::{Effect, EffectSet, Scene, SceneError, SpecularGlossinessAs, document, write};
 
 /// What [`pack`] makes of a file.
 #[derive(Clone, Debug)]
@@ -65,7 +66,7 @@ pub struct SceneSummary {
     pub texels: usize,
     /// Names of cameras.
     pub cameras: Vec<String>,
-    /// Punctual lights, which are not drawn.
+    /// Punctual lights that ever shine.
     pub lights: usize,
     /// World bounds, smallest then largest coordinates.
     pub bounds: Option<[[f32; 3]; 2]>,
@@ -90,11 +91,32 @@ impl Packed {
     }
 }
 
+/// What a project decides about its glTF files.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PackOptions {
+    /// Folders outside the project whose files may be referred to, as `../library`, relative to the project and without
+    /// `..` after the first name, or as `/srv/assets`. A relative one is for relative references, an absolute one for
+    /// absolute paths and `file:` URIs: what is read does not depend on where the project is.
+    pub allowed_folders: Vec<String>,
+    /// How materials of the old model are drawn.
+    pub specular_glossiness: SpecularGlossinessAs,
+}
+
+/// [`pack_with`] that reads nothing outside the project and draws metallic-roughness.
+pub fn pack(file: &str, bytes: &[u8], resolve: &mut dyn FnMut(&str) -> Option<Arc<[u8]>>) -> Packed {
+    pack_with(&PackOptions::default(), file, bytes, resolve)
+}
+
 /// Packs a .gltf or .glb into one normalised GLB and says what it calls for.
 ///
 /// `file` is its name relative to the project, for messages and as the base of what it refers to. `resolve`
 /// returns the bytes of a file by its [`crate::Uri::path`]; it is asked for buffers, and for images in use.
-pub fn pack(file: &str, bytes: &[u8], resolve: &mut dyn FnMut(&str) -> Option<Arc<[u8]>>) -> Packed {
+pub fn pack_with(
+    options: &PackOptions,
+    file: &str,
+    bytes: &[u8],
+    resolve: &mut dyn FnMut(&str) -> Option<Arc<[u8]>>,
+) -> Packed {
     let text = document::text_of(bytes);
     let diagnose = |severity, error: SceneError| error.into_diagnostic(severity, file, text);
     let refuse = |errors: Vec<SceneError>| Packed {
@@ -107,7 +129,8 @@ pub fn pack(file: &str, bytes: &[u8], resolve: &mut dyn FnMut(&str) -> Option<Ar
         Ok(document) => document,
         Err(error) => return refuse(vec![error]),
     };
-    let mut imported = match import(file, &document, resolve) {
+    let references = References { file, allowed_folders: &options.allowed_folders, read: resolve };
+    let mut imported = match import(references, options.specular_glossiness, &document) {
         Ok(imported) => imported,
         Err(errors) => return refuse(errors),
     };
@@ -135,7 +158,8 @@ pub fn pack(file: &str, bytes: &[u8], resolve: &mut dyn FnMut(&str) -> Option<Ar
 /// The first thing that is wrong. Images that cannot be read are not: the neutral texture stands in.
 pub fn load(glb: &[u8]) -> Result<Scene, SceneError> {
     let document = document::parse(glb)?;
-    let imported = import("", &document, &mut |_| None);
+    let references = References { file: "", allowed_folders: &[], read: &mut |_| None };
+    let imported = import(references, SpecularGlossinessAs::default(), &document);
     let imported = imported.map_err(|errors| {
         let first = errors.into_iter().next();
         first.unwrap_or_else(|| SceneError::new("", "the file cannot be read"))

@@ -4,7 +4,7 @@ use glam::{DMat4, DVec3};
 
 use crate::accessor::Data;
 use crate::pose::trs;
-use crate::{Camera, Instance, Light, LightKind, SceneError, limits, schema};
+use crate::{Camera, Instance, Light, LightKind, LightProperty, SceneError, limits, schema};
 
 /// A node's camera in world space, and its properties under the name it goes by.
 ///
@@ -62,6 +62,24 @@ pub(crate) fn placed_light(source: &schema::Light, world: DMat4) -> Result<Light
         kind: light_kind(source)?,
         range: source.range,
     })
+}
+
+/// Whether a light does anything, now or at some time of an animation that takes its values through `ranges`.
+pub(crate) fn ever_shines(light: &schema::Light, ranges: &[(LightProperty, Vec<[f32; 2]>)]) -> bool {
+    let largest = |property: LightProperty, component: usize, at_rest: f32| {
+        let animated = ranges.iter().filter(|(other, _)| *other == property);
+        animated.fold(at_rest, |largest, (_, range)| largest.max(range[component][1]))
+    };
+    let has_power = largest(LightProperty::Intensity, 0, light.intensity) > 0.0;
+    let has_color = (0..3).any(|channel| largest(LightProperty::Color, channel, light.color[channel]) > 0.0);
+    // glTF has ranges for what has a place.
+    let has_range = light.kind == "directional"
+        || light.range.is_none_or(|range| largest(LightProperty::Range, 0, range) > 0.0);
+    let is_open = light.kind != "spot"
+        || light
+            .spot
+            .is_none_or(|spot| largest(LightProperty::OuterConeAngle, 0, spot.outer_cone_angle) > 0.0);
+    has_power && has_color && has_range && is_open
 }
 
 fn unknown_kind(kind: &str, index: usize) -> SceneError {

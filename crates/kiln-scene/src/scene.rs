@@ -24,7 +24,7 @@ pub struct Scene {
     pub images: Vec<Image8>,
     /// Cameras of the file, with their world transform.
     pub cameras: Vec<Camera>,
-    /// Punctual lights of the file.
+    /// Punctual lights of the file that ever shine.
     pub lights: Vec<Light>,
     /// What animations move and what skins hang on, parents first; empty where nothing moves.
     pub nodes: Vec<Node>,
@@ -255,6 +255,8 @@ pub enum Effect {
     NormalMap,
     /// Occlusion texture.
     Occlusion,
+    /// Lights of the scene's own (`KHR_lights_punctual`) shine on it.
+    PunctualLights,
     /// Cloth-like retroreflection at grazing angles.
     Sheen,
     /// Joints that an animation moves.

@@ -1,11 +1,18 @@
-//! Conversion of `KHR_materials_pbrSpecularGlossiness` to metallic-roughness.
+//! Conversion of `KHR_materials_pbrSpecularGlossiness` to metallic-roughness, with `KHR_materials_specular` or without.
 //!
-//! Both models agree where a colour c with metalness m gives the same diffuse and specular reflectance:
+//! With it, reflectance and roughness are what the old model says, to the last bit of their texels: an index of refraction
+//! of 0 stands for a reflectance of 1, which the specular colour scales (conversion note of `KHR_materials_specular`). What
+//! lies below the reflection stays different: the old model takes 1 − max s of the light, from wherever it is seen, the
+//! new one what the Fresnel term leaves, which is the same head-on and less at grazing views.
+//!
+//! Without it both models agree where a colour c with metalness m gives the same diffuse and specular reflectance:
 //! d = c (1 − 0.04)(1 − m) / (1 − max s) and s = 0.04 (1 − m) + c m, on brightness. Eliminating c leaves a
 //! quadratic in m, the one of Khronos' conversion example in the extension's repository folder.
 
+use serde::{Deserialize, Serialize};
+
 use crate::Image8;
-use crate::schema::{Material, MetallicRoughness, SpecularGlossiness, TextureInfo};
+use crate::schema::{Ior, Material, MetallicRoughness, Specular, SpecularGlossiness, TextureInfo};
 use crate::textures::TextureTable;
 
 /// Reflectance of a dielectric at normal incidence for an index of refraction of 1.5.
@@ -13,12 +20,76 @@ const DIELECTRIC: f32 = 0.04;
 /// Below it a quotient is noise.
 const SMALL: f32 = 1e-6;
 
+/// How materials of `KHR_materials_pbrSpecularGlossiness` are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SpecularGlossinessAs {
+    /// As metal and dielectric, which calls for no effect; colours of dielectrics' reflections are lost.
+    #[default]
+    MetallicRoughness,
+    /// As dielectrics whose reflectance at normal incidence is the old model's specular colour
+    /// (`KHR_materials_specular`), exactly.
+    Specular,
+}
+
 /// Replaces the material's base layer; textures are converted texel by texel where the result varies.
 ///
 /// # Errors
 /// A sentence, if a converted texture cannot be made; the factors are converted then.
-pub(crate) fn convert(material: &mut Material, table: &mut TextureTable<'_, '_>) -> Result<(), String> {
+pub(crate) fn convert(
+    material: &mut Material,
+    to: SpecularGlossinessAs,
+    table: &mut TextureTable<'_, '_>,
+) -> Result<(), String> {
     let Some(source) = material.extensions.specular_glossiness.take() else { return Ok(()) };
+    match to {
+        SpecularGlossinessAs::MetallicRoughness => to_metallic_roughness(material, &source, table),
+        SpecularGlossinessAs::Specular => to_specular(material, source, table),
+    }
+}
+
+fn to_specular(
+    material: &mut Material,
+    source: SpecularGlossiness,
+    table: &mut TextureTable<'_, '_>,
+) -> Result<(), String> {
+    material.pbr_metallic_roughness = MetallicRoughness {
+        base_color_factor: source.diffuse_factor,
+        base_color_texture: source.diffuse_texture,
+        metallic_factor: 0.0,
+        roughness_factor: 1.0 - source.glossiness_factor,
+        metallic_roughness_texture: None,
+    };
+    material.extensions.ior = Some(Ior { ior: 0.0 });
+    let specular = Specular { specular_color_factor: source.specular_factor, ..Specular::default() };
+    let specular = material.extensions.specular.insert(specular);
+    let Some(info) = source.specular_glossiness_texture else { return Ok(()) };
+    let Some(like) = table.get(&info) else { return Ok(()) };
+    let (color, roughness) = split(&table.pictures[like.picture].decoded, source.glossiness_factor);
+    let color = table.generate(like, color)?;
+    let roughness = table.generate(like, roughness)?;
+    specular.specular_color_texture = Some(TextureInfo { index: color, ..info.clone() });
+    let base = &mut material.pbr_metallic_roughness;
+    base.metallic_roughness_texture = Some(TextureInfo { index: roughness, ..info });
+    base.roughness_factor = 1.0;
+    Ok(())
+}
+
+/// The specular colours as they are (sRGB), and a metallic-roughness image without metal.
+fn split(specular_glossiness: &Image8, glossiness_factor: f32) -> (Image8, Image8) {
+    let (texels, _) = specular_glossiness.rgba.as_chunks::<4>();
+    let color = texels.iter().flat_map(|&[red, green, blue, _]| [red, green, blue, u8::MAX]).collect();
+    let roughness = |glossiness: u8| code(1.0 - glossiness_factor * f32::from(glossiness) / 255.0);
+    let rough = texels.iter().flat_map(|texel| [u8::MAX, roughness(texel[3]), 0, u8::MAX]).collect();
+    let image = |rgba| Image8 { rgba, ..*specular_glossiness };
+    (image(color), image(rough))
+}
+
+fn to_metallic_roughness(
+    material: &mut Material,
+    source: &SpecularGlossiness,
+    table: &mut TextureTable<'_, '_>,
+) -> Result<(), String> {
     let solved = solve(
         [source.diffuse_factor[0], source.diffuse_factor[1], source.diffuse_factor[2]],
         source.specular_factor,
@@ -33,7 +104,7 @@ pub(crate) fn convert(material: &mut Material, table: &mut TextureTable<'_, '_>)
     };
     let varies = source.specular_glossiness_texture.is_some()
         || (source.diffuse_texture.is_some() && brightness(source.specular_factor) > DIELECTRIC);
-    if varies { convert_texels(material, &source, table) } else { Ok(()) }
+    if varies { convert_texels(material, source, table) } else { Ok(()) }
 }
 
 fn convert_texels(

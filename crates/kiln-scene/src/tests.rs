@@ -8,10 +8,12 @@ mod deforming;
 mod effects;
 mod geometry;
 mod hostile;
+mod lights;
 mod motion;
 mod packing;
 mod playing;
 mod second_reader;
+mod specular_glossiness;
 mod uris;
 mod variants;
 

@@ -1,11 +1,11 @@
 //! Textures of a file, decoded on first use.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use crate::accessor::{Blob, Data, fetch_uri};
 use crate::images::{self, ChannelRange, Picture};
 use crate::schema::{self, TextureInfo};
+use crate::uri::References;
 use crate::{Image8, Sampler, SceneError, Wrap, limits};
 
 /// A texture that could be read.
@@ -18,30 +18,27 @@ pub(crate) struct Found {
 
 /// Decodes what is asked for, once.
 pub(crate) struct TextureTable<'a, 'b> {
-    file: &'a str,
+    references: References<'a>,
     data: &'a Data<'b>,
-    resolve: &'a mut dyn FnMut(&str) -> Option<Arc<[u8]>>,
     /// By the file's texture index; generated ones follow after the file's.
     textures: BTreeMap<usize, Option<Found>>,
     /// By the file's image index.
     images: BTreeMap<usize, Option<usize>>,
+    /// By the file's URIs: what several images name is decoded and packed once.
+    files: BTreeMap<&'a str, usize>,
     pub pictures: Vec<Picture>,
     pub warnings: Vec<SceneError>,
     texels_left: usize,
 }
 
 impl<'a, 'b> TextureTable<'a, 'b> {
-    pub fn new(
-        file: &'a str,
-        data: &'a Data<'b>,
-        resolve: &'a mut dyn FnMut(&str) -> Option<Arc<[u8]>>,
-    ) -> Self {
+    pub fn new(references: References<'a>, data: &'a Data<'b>) -> Self {
         TextureTable {
-            file,
+            references,
             data,
-            resolve,
             textures: BTreeMap::new(),
             images: BTreeMap::new(),
+            files: BTreeMap::new(),
             pictures: Vec::new(),
             warnings: Vec::new(),
             texels_left: limits::TEXEL_COUNT_MAX,
@@ -127,11 +124,18 @@ impl<'a, 'b> TextureTable<'a, 'b> {
         if let Some(known) = self.images.get(&image) {
             return known.ok_or_else(|| SceneError::new(user, format!("image {image} could not be read")));
         }
+        let data: &'a Data<'b> = self.data;
+        let uri = data.root.images.get(image).and_then(|image| image.uri.as_deref());
+        if let Some(&known) = uri.and_then(|uri| self.files.get(uri)) {
+            self.images.insert(image, Some(known));
+            return Ok(known);
+        }
         self.images.insert(image, None);
         let picture = self.decode(image, user)?;
         self.texels_left -= picture.decoded.rgba.len() / 4;
         self.pictures.push(picture);
         self.images.insert(image, Some(self.pictures.len() - 1));
+        self.files.extend(uri.map(|uri| (uri, self.pictures.len() - 1)));
         Ok(self.pictures.len() - 1)
     }
 
@@ -144,7 +148,7 @@ impl<'a, 'b> TextureTable<'a, 'b> {
         let blob;
         let bytes: &[u8] = match (&image.uri, image.buffer_view) {
             (Some(uri), _) => {
-                blob = fetch_uri(self.file, &format!("{place}/uri"), uri, self.resolve)?;
+                blob = fetch_uri(&mut self.references, &format!("{place}/uri"), uri)?;
                 match &blob {
                     Blob::Owned(bytes) => bytes,
                     Blob::Shared(bytes) => bytes,

@@ -1,8 +1,21 @@
 //! Where buffers and images outside the file are, and `data:` URIs.
 
+use std::fmt;
+use std::sync::Arc;
+
 use kiln_diagnostic::{Diagnostic, Severity};
 
 use crate::{SceneError, document};
+
+/// A glTF file's way to the files that it refers to.
+pub(crate) struct References<'a> {
+    /// Its name relative to the project.
+    pub file: &'a str,
+    /// See [`crate::PackOptions::allowed_folders`].
+    pub allowed_folders: &'a [String],
+    /// The bytes of a file by its [`Uri::path`].
+    pub read: &'a mut dyn FnMut(&str) -> Option<Arc<[u8]>>,
+}
 
 /// What a URI is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -18,7 +31,8 @@ pub enum UriKind {
 pub struct Uri {
     /// What it is for.
     pub kind: UriKind,
-    /// Relative to the project, decoded, with `/`: what [`crate::pack`] asks its resolver for.
+    /// Relative to the project, or absolute where the reference is, decoded, with `/`: what [`crate::pack`] asks its
+    /// resolver for.
     pub path: String,
     /// As the file says it, relative to the file's folder, decoded.
     pub reference: String,
@@ -26,7 +40,7 @@ pub struct Uri {
 
 /// Buffers and images outside the file `file` (its name relative to the project), in the file's order,
 /// each once, with a diagnostic for each one that is refused: absolute paths, schemes other than `data:`,
-/// paths that leave the project. A file that cannot be read at all gives its error.
+/// paths that leave the project, in which no other folder is allowed. A file that cannot be read at all gives its error.
 pub fn external_uris(file: &str, bytes: &[u8]) -> (Vec<Uri>, Vec<Diagnostic>) {
     let text = document::text_of(bytes);
     let to_diagnostic = |error: SceneError| error.into_diagnostic(Severity::Error, file, text);
@@ -38,7 +52,7 @@ pub fn external_uris(file: &str, bytes: &[u8]) -> (Vec<Uri>, Vec<Diagnostic>) {
     let images = root.images.iter().map(|image| (UriKind::Image, "images", image.uri.as_deref()));
     let (mut uris, mut diagnostics) = (Vec::new(), Vec::new());
     for (kind, table, index, uri) in enumerate(buffers).chain(enumerate(images)) {
-        match resolve(file, &format!("/{table}/{index}/uri"), uri) {
+        match resolve(file, &[], &format!("/{table}/{index}/uri"), uri) {
             Ok((path, reference)) => {
                 let uri = Uri { kind, path, reference };
                 if !uris.contains(&uri) {
@@ -62,40 +76,106 @@ fn enumerate<'a>(
     })
 }
 
-/// Project-relative path and decoded reference of a URI in `file`.
+/// Path (relative to the project, or absolute in an allowed folder) and decoded reference of a URI in `file`.
 ///
 /// # Errors
-/// Absolute paths, schemes, paths out of the project, broken percent-encoding.
-pub(crate) fn resolve(file: &str, pointer: &str, uri: &str) -> Result<(String, String), SceneError> {
+/// Schemes other than `file:`, broken percent-encoding, and whatever lies neither in the project nor in one of
+/// `allowed_folders`.
+pub(crate) fn resolve(
+    file: &str,
+    allowed_folders: &[String],
+    pointer: &str,
+    uri: &str,
+) -> Result<(String, String), SceneError> {
     let refuse = |why: &str| {
         SceneError::new(pointer, format!("`{}` {why}", shorten(uri)))
             .with_help("refer to files inside the project, by a path relative to this file")
     };
-    if has_scheme(uri) {
-        return Err(refuse("has a scheme; only files of the project and `data:` are read"));
-    }
-    let reference = percent_decode(uri).ok_or_else(|| refuse("has a broken percent-encoding"))?;
-    if reference.starts_with(['/', '\\']) || has_scheme(&reference) {
-        return Err(refuse("is an absolute path"));
+    let path = local_path(uri).ok_or_else(|| refuse("has a scheme; only files and `data:` are read"))?;
+    let reference = percent_decode(path).ok_or_else(|| refuse("has a broken percent-encoding"))?;
+    if has_scheme(&reference) {
+        return Err(refuse("is an absolute path of another system"));
     }
     if reference.contains(['\0', '\\']) {
         return Err(refuse("contains a character that no path of a project has"));
     }
     let folder = file.rsplit_once('/').map_or("", |(folder, _)| folder);
-    let mut parts: Vec<&str> = Vec::new();
-    for part in folder.split('/').chain(reference.split('/')) {
-        match part {
-            "" | "." => {}
-            ".." => {
-                parts.pop().ok_or_else(|| refuse("leaves the project"))?;
+    let joined = if reference.starts_with('/') || folder.is_empty() && !file.starts_with('/') {
+        reference.clone()
+    } else {
+        format!("{folder}/{reference}")
+    };
+    let place = Place::new(&joined).filter(|place| !place.parts.is_empty() && !reference.is_empty());
+    let place = place.ok_or_else(|| refuse("names no file"))?;
+    let is_allowed = |folder: &String| Place::new(folder).is_some_and(|folder| place.is_below(&folder));
+    if place.leaves_project() && !allowed_folders.iter().any(is_allowed) {
+        let folder = place.folder();
+        let why = if place.is_absolute { "is an absolute path" } else { "leaves the project" };
+        return Err(refuse(why).with_help(format!(
+            "copy the file into the project, or allow its folder: allow_folders = [\"{folder}\"] in [project] of kiln.toml"
+        )));
+    }
+    Ok((place.to_string(), reference))
+}
+
+/// A path without `.`, and without `..` after a name: where it leads if nothing on it is a link.
+#[derive(Debug, PartialEq, Eq)]
+struct Place<'a> {
+    is_absolute: bool,
+    /// How many folders above the project's it begins.
+    ups: usize,
+    parts: Vec<&'a str>,
+}
+
+impl<'a> Place<'a> {
+    /// `None`: it leads above the root.
+    fn new(path: &'a str) -> Option<Place<'a>> {
+        let mut place = Place { is_absolute: path.starts_with('/'), ups: 0, parts: Vec::new() };
+        for part in path.split('/') {
+            match part {
+                "" | "." => {}
+                ".." if place.parts.pop().is_some() => {}
+                ".." if place.is_absolute => return None,
+                ".." => place.ups += 1,
+                part => place.parts.push(part),
             }
-            part => parts.push(part),
         }
+        Some(place)
     }
-    if reference.is_empty() || parts.is_empty() {
-        return Err(refuse("names no file"));
+
+    fn leaves_project(&self) -> bool {
+        self.is_absolute || self.ups > 0
     }
-    Ok((parts.join("/"), reference))
+
+    /// A folder that is nothing but `..` holds the project itself and all above it: whoever writes it means it.
+    fn is_below(&self, folder: &Place) -> bool {
+        self.is_absolute == folder.is_absolute
+            && match folder.parts.as_slice() {
+                [] => self.ups <= folder.ups,
+                parts => self.ups == folder.ups && self.parts.starts_with(parts),
+            }
+    }
+
+    /// The folder that holds it.
+    fn folder(&self) -> Place<'a> {
+        let parts = self.parts.split_last().map_or(Vec::new(), |(_, folders)| folders.to_vec());
+        Place { parts, ..*self }
+    }
+}
+
+impl fmt::Display for Place<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ups = std::iter::repeat_n("..", self.ups);
+        let parts: Vec<&str> = ups.chain(self.parts.iter().copied()).collect();
+        write!(f, "{}{}", if self.is_absolute { "/" } else { "" }, parts.join("/"))
+    }
+}
+
+/// The path of a relative reference or of a `file:` URI; `None` for other schemes, and for other machines' files.
+fn local_path(uri: &str) -> Option<&str> {
+    let Some(path) = uri.strip_prefix("file:") else { return (!has_scheme(uri)).then_some(uri) };
+    let path = path.strip_prefix("//").map_or(path, |path| path.strip_prefix("localhost").unwrap_or(path));
+    path.starts_with('/').then_some(path)
 }
 
 /// RFC 3986 scheme, or a drive letter, which looks the same.

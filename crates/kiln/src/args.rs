@@ -58,6 +58,8 @@ pub(crate) enum Command {
     /// Build a project and draw it into PNG or EXR files: no daemon, no window, the pixels of the preview
     #[cfg(feature = "preview")]
     Render(RenderArgs),
+    /// Compare pictures: numbers, what the eye makes of them, a heat map; for people and for CI
+    Diff(DiffArgs),
     /// Make a sample project, bake it, show it, and edit it before your eyes
     Demo(DemoArgs),
 }
@@ -456,6 +458,34 @@ pub(crate) struct RenderArgs {
     /// Lay all pictures out on one, a row for each scene under each light
     #[arg(long, value_name = "FILE.png")]
     pub(crate) sheet: Option<PathBuf>,
+}
+
+#[derive(Debug, ClapArgs)]
+#[command(after_help = "\
+Examples:
+  kiln diff golden/frame.png frames/frame.png --out differences
+  kiln diff golden frames --flip 0.01                       every picture of a folder with the one of its name
+  kiln diff a.exr b.exr                                     radiance, tone-mapped with Khronos PBR Neutral
+
+FLIP says what an observer notices who flips between the two on a screen 70 cm away: 0 nothing, 1 all.
+Exit codes: 0 within the limits, 1 not (or a picture is missing), 2 the tool failed.")]
+pub(crate) struct DiffArgs {
+    /// What it should be: a picture (.png .jpg .exr .hdr) or a folder of them
+    pub(crate) reference: PathBuf,
+    /// What it is: the same
+    pub(crate) test: PathBuf,
+    /// Largest mean FLIP that passes
+    #[arg(long, value_name = "MEAN", default_value_t = 0.005)]
+    pub(crate) flip: f64,
+    /// Largest difference of any channel of any pixel that passes, in 1/255
+    #[arg(long, value_name = "STEPS")]
+    pub(crate) steps: Option<u8>,
+    /// Write reference, heat map and test side by side into this folder, for pictures that differ
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print JSON instead of text
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, ClapArgs)]

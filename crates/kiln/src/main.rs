@@ -61,6 +61,7 @@ fn main() -> ExitCode {
         args::Command::Preview(args) => commands::preview::run(&args),
         #[cfg(feature = "preview")]
         args::Command::Render(args) => commands::render::run(&args),
+        args::Command::Diff(args) => commands::diff::run(&args),
         args::Command::Demo(args) => commands::demo::run(&args),
     };
     result.unwrap_or_else(|error| {

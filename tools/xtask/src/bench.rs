@@ -256,7 +256,7 @@ pub(crate) fn size() -> Result<(), String> {
 }
 
 /// CPU time of all children that have ended, on Linux: a busy machine distorts it less than wall-clock time.
-fn children_cpu_seconds() -> Option<f64> {
+pub(crate) fn children_cpu_seconds() -> Option<f64> {
     let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
     // The fields after the program's name in parentheses; proc(5) counts them from 3, and cutime and cstime are 16 and 17.
     let mut fields = stat.rsplit_once(')')?.1.split_whitespace().skip(13);

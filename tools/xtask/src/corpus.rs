@@ -53,7 +53,25 @@ pub(crate) fn run(out: &str) -> Result<(), String> {
     Ok(())
 }
 
-fn name_of(path: &str) -> String {
+/// The corpus' panoramas: names for environments, and files relative to the corpus.
+pub(crate) fn panoramas(corpus: &Path) -> Result<Vec<(String, String)>, String> {
+    let mut panoramas = Vec::new();
+    for folder in PANORAMAS {
+        let entries = corpus.join(folder).read_dir().map_err(|error| format!("{folder}: {error}"))?;
+        let mut files: Vec<String> = entries
+            .filter_map(|entry| Some(entry.ok()?.file_name().to_string_lossy().into_owned()))
+            .collect();
+        files.sort();
+        for file in files.iter().filter(|file| file.ends_with(".hdr") || file.ends_with(".exr")) {
+            let kind = if file.ends_with(".exr") { "exr-" } else { "" };
+            panoramas.push((format!("{kind}{}", name_of(file)), format!("{folder}/{file}")));
+        }
+    }
+    Ok(panoramas)
+}
+
+/// A file's name as names in kiln.toml are spelt.
+pub(crate) fn name_of(path: &str) -> String {
     let stem = Path::new(path).file_stem().unwrap_or_default().to_string_lossy();
     stem.chars().map(|character| if character.is_ascii_alphanumeric() { character } else { '_' }).collect()
 }
@@ -70,16 +88,8 @@ fn write_project(corpus: &Path, project: &Path) -> Result<(), String> {
         std::os::unix::fs::symlink(corpus, &link).map_err(text)?;
     }
     let mut toml = "version = 1\n[project]\nname = \"corpus\"\n".to_owned();
-    for folder in PANORAMAS {
-        let entries = corpus.join(folder).read_dir().map_err(|error| format!("{folder}: {error}"))?;
-        let mut files: Vec<String> = entries
-            .filter_map(|entry| Some(entry.ok()?.file_name().to_string_lossy().into_owned()))
-            .collect();
-        files.sort();
-        for file in files.iter().filter(|file| file.ends_with(".hdr") || file.ends_with(".exr")) {
-            let kind = if file.ends_with(".exr") { "exr-" } else { "" };
-            toml.push_str(&format!("[env.{kind}{}]\nsource = \"corpus/{folder}/{file}\"\n", name_of(file)));
-        }
+    for (name, file) in panoramas(corpus)? {
+        toml.push_str(&format!("[env.{name}]\nsource = \"corpus/{file}\"\n"));
     }
     for scene in SCENES {
         let source = format!("corpus/gltf/khronos-sample-assets/{scene}");

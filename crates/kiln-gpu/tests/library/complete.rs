@@ -61,6 +61,7 @@ fn every_function_of_the_library_is_compared() {
         include_str!("colour.rs"),
         include_str!("functions.rs"),
         include_str!("lobes.rs"),
+        include_str!("punctual.rs"),
         include_str!("samples.rs"),
     ];
     let comparisons: String = sources.map(shader_texts).join("\n");

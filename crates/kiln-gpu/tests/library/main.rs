@@ -12,6 +12,7 @@ mod glsl;
 mod lobes;
 mod passes;
 mod pictures;
+mod punctual;
 mod reference;
 mod samples;
 mod semantics;

@@ -2,6 +2,7 @@
 
 mod cancel;
 mod colour;
+mod compare;
 mod containers;
 mod corpus;
 mod corpus_environment;

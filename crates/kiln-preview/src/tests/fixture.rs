@@ -29,6 +29,18 @@ pub fn gpu() -> Option<Gpu> {
     }
 }
 
+/// Edge of [`Build::lut`]'s table.
+pub const LUT_SIZE: usize = 32;
+
+/// Scale and bias at a texel: column n·v, row perceptual roughness.
+pub fn lut_texel(column: usize, row: usize) -> [f32; 2] {
+    let [n_dot_v, roughness] = [column, row].map(|step| (step as f32 + 0.5) / LUT_SIZE as f32);
+    let (x, y) = (1.0 - roughness, 0.0425 - 0.0275 * roughness);
+    let a = (x * x).min((-9.28 * n_dot_v).exp2()) * x + y;
+    let (scale, bias) = (1.04 - 0.572 * roughness - 1.04 * a, 0.022 * roughness - 0.04 + 1.04 * a);
+    [scale.clamp(0.0, 1.0), bias.clamp(0.0, 1.0)]
+}
+
 /// A revision that grows target by target.
 #[derive(Clone, Default)]
 pub struct Build {
@@ -133,17 +145,10 @@ impl Build {
 
     /// Lazarov's fit of the split-sum table: smooth, plausible, and not constant.
     pub fn lut(&mut self) -> &mut Self {
-        const SIZE: usize = 32;
-        let texel = |index: usize| {
-            let at = |step: usize| (step as f32 + 0.5) / SIZE as f32;
-            let (n_dot_v, roughness) = (at(index % SIZE), at(index / SIZE));
-            let (x, y) = (1.0 - roughness, 0.0425 - 0.0275 * roughness);
-            let a = (x * x).min((-9.28 * n_dot_v).exp2()) * x + y;
-            let (scale, bias) = (1.04 - 0.572 * roughness - 1.04 * a, 0.022 * roughness - 0.04 + 1.04 * a);
-            [scale.clamp(0.0, 1.0), bias.clamp(0.0, 1.0)].map(f32::to_le_bytes).concat()
-        };
-        let texels: Vec<u8> = (0..SIZE * SIZE).flat_map(texel).collect();
-        self.target("lut/ggx", "lut", json!({ "size": SIZE, "format": "rg32f" }), &[("texels", texels)])
+        let texel =
+            |index: usize| lut_texel(index % LUT_SIZE, index / LUT_SIZE).map(f32::to_le_bytes).concat();
+        let texels: Vec<u8> = (0..LUT_SIZE * LUT_SIZE).flat_map(texel).collect();
+        self.target("lut/ggx", "lut", json!({ "size": LUT_SIZE, "format": "rg32f" }), &[("texels", texels)])
     }
 
     pub fn scene(&mut self, name: &str, env: &str, glb: Vec<u8>) -> &mut Self {
@@ -181,6 +186,8 @@ pub struct Sphere {
     pub scale: Option<[f32; 3]>,
     /// More spheres: material, middle, radius.
     pub others: Vec<(Value, [f32; 3], f32)>,
+    /// Lights of `KHR_lights_punctual`, each with where its node stands.
+    pub lights: Vec<(Value, Value)>,
 }
 
 impl Sphere {
@@ -230,7 +237,12 @@ impl Sphere {
         }
         let materials: Vec<&Value> =
             [&self.material].into_iter().chain(self.others.iter().map(|(material, ..)| material)).collect();
-        let document = json!({
+        for (at, (_, node)) in self.lights.iter().enumerate() {
+            let mut node = node.clone();
+            node["extensions"] = json!({ "KHR_lights_punctual": { "light": at } });
+            nodes.push(node);
+        }
+        let mut document = json!({
             "asset": { "version": "2.0" }, "scene": 0,
             "scenes": [{ "nodes": (0..nodes.len()).collect::<Vec<_>>() }],
             "nodes": nodes,
@@ -247,6 +259,10 @@ impl Sphere {
                 { "bufferView": 2, "componentType": 5126, "count": count, "type": "VEC4" },
             ],
         });
+        if !self.lights.is_empty() {
+            let lights: Vec<&Value> = self.lights.iter().map(|(light, _)| light).collect();
+            document["extensions"] = json!({ "KHR_lights_punctual": { "lights": lights } });
+        }
         let packed = kiln_scene::pack("sphere.glb", &glb(&document, &binary), &mut |_| None);
         packed.glb.unwrap_or_else(|| panic!("{:?}", packed.diagnostics)).to_vec()
     }

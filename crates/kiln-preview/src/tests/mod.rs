@@ -5,6 +5,7 @@ mod effects;
 mod faults;
 mod fixture;
 mod frames;
+mod lights;
 mod panels;
 mod parameters;
 mod pure;

@@ -18,7 +18,14 @@ fn wrong_project_files_are_explained() {
             "`../../b` is no feature",
             4,
         ),
+        ("version = 1\n[project]\nallow_folders = [\"x/../lib\"]\n", "lies in the project", 3),
         ("version = 1\n[shader.a]\nsource = \"../a.wgsl\"\n", "lies outside the project", 3),
+        (
+            "version = 1\n[env.a]\nsource = \"a.hdr\"\n[shader.pbr]\nsource = \"a.wgsl\"\n\
+             [scene.s]\nsource = \"s.glb\"\nspecular_glossiness = \"speculr\"\n",
+            "did you mean `specular`?",
+            8,
+        ),
         (
             "version = 1\n[shader.a]\nsource = \"a.frag\"\nprelude = [\"/etc/passwd\"]\n",
             "lies outside the project",

@@ -11,6 +11,7 @@ mod config;
 mod demand;
 mod edits;
 mod outputs;
+mod outside;
 
 const TOML: &str = r#"version = 1
 [project]

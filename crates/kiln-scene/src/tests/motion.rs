@@ -185,7 +185,7 @@ fn arm() -> File {
 
 #[test]
 fn pack_keeps_nodes_that_move_and_what_they_carry() {
-    assert_eq!(variant(arm()), "base");
+    assert_eq!(variant(arm()), "punctual_lights");
     let scene = scene_of(&arm().bytes());
     let names: Vec<(&str, Option<usize>)> =
         scene.nodes.iter().map(|node| (node.name.as_str(), node.parent)).collect();

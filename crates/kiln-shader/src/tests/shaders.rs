@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::{Files, compiled, set};
 use crate::{BindingKind, Compiled, Program, Reflection, scan};
 
-pub(super) const FEATURES: [&str; 16] = [
+pub(super) const FEATURES: [&str; 17] = [
     "alpha_blend",
     "alpha_mask",
     "anisotropy",
@@ -16,6 +16,7 @@ pub(super) const FEATURES: [&str; 16] = [
     "iridescence",
     "normal_map",
     "occlusion",
+    "punctual_lights",
     "sheen",
     "specular",
     "transmission",
@@ -25,7 +26,7 @@ pub(super) const FEATURES: [&str; 16] = [
 ];
 
 /// Names of the interface that belong to one feature, by what they start with.
-const OWNED: [(&str, &str); 22] = [
+const OWNED: [(&str, &str); 24] = [
     ("alpha_mask", "alpha_cutoff"),
     ("anisotropy", "anisotropy_"),
     ("clearcoat", "clearcoat_"),
@@ -39,6 +40,8 @@ const OWNED: [(&str, &str); 22] = [
     ("occlusion", "occlusion_texture"),
     ("occlusion", "occlusion_strength"),
     ("occlusion", "occlusion_uv_"),
+    ("punctual_lights", "lights"),
+    ("punctual_lights", "Punctual"),
     ("sheen", "sheen_"),
     ("specular", "specular_factor"),
     ("specular", "specular_color_"),

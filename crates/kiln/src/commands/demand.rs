@@ -178,6 +178,7 @@ fn passes(plan: &Plan) -> Vec<(&'static str, String, bool)> {
             "no material transmits light",
         ),
         pass("pass blended, sorted by depth", &has(Effect::AlphaBlend), "no material is transparent"),
+        pass("light loops", &has(Effect::PunctualLights), "no lit scene has lights of its own"),
         pass(
             "tangents",
             &|material| {

@@ -4,6 +4,7 @@ pub(crate) mod bake;
 pub(crate) mod cube_picture;
 pub(crate) mod demand;
 pub(crate) mod demo;
+pub(crate) mod diff;
 pub(crate) mod doctor;
 pub(crate) mod env;
 pub(crate) mod export;
