@@ -1,11 +1,11 @@
 //! Reads a file's animations. One that is wrong is left out with a warning: the rest pose needs none of them.
 //! Warnings have the places of `conform/animations`, whose word on the same place then is not needed.
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::accessor::Data;
 use crate::schema::{AnimationChannel, AnimationSampler, Root};
-use crate::write::GENERATOR;
 use crate::{
     Animation, CameraProperty, Channel, Curve, Interpolation, LightProperty, MaterialProperty, SceneError,
     Target, limits, schema,
@@ -48,13 +48,13 @@ pub(crate) fn read(data: &Data<'_>) -> Motion {
 }
 
 impl Motion {
-    fn targets(&self) -> impl Iterator<Item = (Target, &Curve)> {
+    pub fn targets(&self) -> impl Iterator<Item = (Target, &Curve)> {
         self.animations.iter().flat_map(|animation| {
             animation.channels.iter().map(|channel| (channel.target, &animation.curves[channel.curve]))
         })
     }
 
-    /// Nodes that any channel names.
+    /// Nodes that any channel moves, shows or hides; weights belong to draws.
     pub fn nodes(&self) -> BTreeSet<usize> {
         self.targets().filter_map(|(target, _)| node_of(target)).collect()
     }
@@ -93,30 +93,46 @@ fn node_of(target: Target) -> Option<usize> {
         Target::Translation { node }
         | Target::Rotation { node }
         | Target::Scale { node }
-        | Target::Weights { node }
         | Target::Visibility { node } => Some(node),
-        Target::Material { .. } | Target::Camera { .. } | Target::Light { .. } => None,
+        Target::Weights { .. } | Target::Material { .. } | Target::Camera { .. } | Target::Light { .. } => {
+            None
+        }
     }
+}
+
+/// A channel's target in a scene.
+pub(crate) struct Resolved<'a> {
+    pub target: Target,
+    /// The components of the curve that are left; `None` for all.
+    pub components: Option<&'a [usize]>,
 }
 
 /// Turns targets into those of a scene, of which there may be several or none, and drops what is left without any.
 /// Curves are numbered in the order of their first use, as reading does it.
-pub(crate) fn retarget(
+pub(crate) fn retarget<'a>(
     animations: Vec<Animation>,
-    resolve: &dyn Fn(Target) -> Vec<Target>,
+    resolve: &dyn Fn(Target) -> Vec<Resolved<'a>>,
 ) -> Vec<Animation> {
     // A file can have a thousand cameras that are one, and a thousand channels for it.
-    let mut left = limits::CHANNEL_COUNT_MAX;
+    let (mut left, mut values_left) = (limits::CHANNEL_COUNT_MAX, limits::CURVE_VALUE_COUNT_MAX);
     let retargeted = animations.into_iter().map(|source| {
         let mut animation = Animation { name: source.name, ..Animation::default() };
         let mut numbers = BTreeMap::new();
         for channel in &source.channels {
-            for target in resolve(channel.target).into_iter().take(left) {
+            for Resolved { target, components } in resolve(channel.target).into_iter().take(left) {
                 left -= 1;
-                let curve = *numbers.entry(channel.curve).or_insert_with(|| {
-                    animation.curves.push(source.curves[channel.curve].clone());
-                    animation.curves.len() - 1
-                });
+                let curve = match numbers.entry((channel.curve, components)) {
+                    Entry::Occupied(known) => *known.get(),
+                    Entry::Vacant(place) => {
+                        let whole = &source.curves[channel.curve];
+                        let Some(rest) = values_left.checked_sub(whole.values.len()) else { continue };
+                        values_left = rest;
+                        let part = components.filter(|them| !them.iter().copied().eq(0..whole.width));
+                        let curve = part.map_or_else(|| whole.clone(), |them| whole.components(them));
+                        animation.curves.push(curve);
+                        *place.insert(animation.curves.len() - 1)
+                    }
+                };
                 animation.channels.push(Channel { target, curve });
             }
         }
@@ -132,17 +148,32 @@ pub(crate) struct Renumbering<'a> {
     pub materials: &'a BTreeMap<usize, (usize, Vec<MaterialProperty>)>,
     pub cameras: BTreeMap<usize, Vec<usize>>,
     pub lights: BTreeMap<usize, Vec<usize>>,
+    /// Morphing draws by the file's node, with the targets that each has.
+    pub morphs: BTreeMap<usize, Vec<(usize, &'a [usize])>>,
 }
 
-impl Renumbering<'_> {
-    pub fn apply(&self, target: Target) -> Vec<Target> {
+impl<'a> Renumbering<'a> {
+    pub fn apply(&self, target: Target) -> Vec<Resolved<'a>> {
+        if let Target::Weights { morph: node } = target {
+            let draws = self.morphs.get(&node).into_iter().flatten();
+            let resolved = |&(morph, targets): &(usize, &'a [usize])| Resolved {
+                target: Target::Weights { morph },
+                components: Some(targets),
+            };
+            return draws.map(resolved).collect();
+        }
+        let whole = |target| Resolved { target, components: None };
+        self.whole(target).into_iter().map(whole).collect()
+    }
+
+    fn whole(&self, target: Target) -> Vec<Target> {
         let node = |node: usize| self.nodes.get(&node).copied();
         let one = |target: Option<Target>| target.into_iter().collect();
         match target {
             Target::Translation { node: it } => one(node(it).map(|node| Target::Translation { node })),
             Target::Rotation { node: it } => one(node(it).map(|node| Target::Rotation { node })),
             Target::Scale { node: it } => one(node(it).map(|node| Target::Scale { node })),
-            Target::Weights { node: it } => one(node(it).map(|node| Target::Weights { node })),
+            Target::Weights { .. } => Vec::new(),
             Target::Visibility { node: it } => one(node(it).map(|node| Target::Visibility { node })),
             Target::Material { material, property } => {
                 let found = self.materials.get(&material).filter(|(_, left)| left.contains(&property));
@@ -198,7 +229,7 @@ impl Reader<'_, '_> {
                 let reason = format!("channel {at} moves the same");
                 return Err(SceneError::new(format!("{place}/channels/{first}/target"), reason));
             }
-            let shape = self.shape(target, sampler, &user)?;
+            let shape = self.shape(target, &user)?;
             let curve = match known.get(&(channel.sampler, shape)) {
                 Some(&curve) => curve,
                 None => {
@@ -230,12 +261,12 @@ impl Reader<'_, '_> {
             }
             return Ok(found);
         }
-        let Some(node) = target.node.or_else(|| morphed_node(root, target)) else { return Ok(None) };
+        let Some(node) = target.node else { return Ok(None) };
         let found = match target.path.as_str() {
             "translation" => Target::Translation { node },
             "rotation" => Target::Rotation { node },
             "scale" => Target::Scale { node },
-            "weights" => Target::Weights { node },
+            "weights" => Target::Weights { morph: node },
             other => {
                 let reason = format!(
                     "`{}` is none of translation, rotation, scale, weights",
@@ -252,7 +283,7 @@ impl Reader<'_, '_> {
         Ok(Some(found))
     }
 
-    fn shape(&self, target: Target, sampler: &AnimationSampler, user: &str) -> Result<Shape, SceneError> {
+    fn shape(&self, target: Target, user: &str) -> Result<Shape, SceneError> {
         let plain = |width| Shape { width, is_list: false, is_rotation: false, is_flag: false };
         Ok(match target {
             Target::Translation { .. } | Target::Scale { .. } => plain(3),
@@ -261,26 +292,17 @@ impl Reader<'_, '_> {
             Target::Material { property, .. } => plain(property.width()),
             Target::Light { property, .. } => plain(property.width()),
             Target::Camera { .. } => plain(1),
-            Target::Weights { node } => {
-                Shape { is_list: true, ..plain(self.weight_count(node, sampler, user)?) }
+            Target::Weights { morph: node } => {
+                Shape { is_list: true, ..plain(self.weight_count(node, user)?) }
             }
         })
     }
 
-    /// Morph targets of a node's mesh. A pack has no mesh there: its curve says how many there were.
-    fn weight_count(&self, node: usize, sampler: &AnimationSampler, user: &str) -> Result<usize, SceneError> {
+    /// Morph targets of a node's mesh.
+    fn weight_count(&self, node: usize, user: &str) -> Result<usize, SceneError> {
         let root = self.data.root;
         let mesh = root.nodes[node].mesh.and_then(|mesh| root.meshes.get(mesh));
-        let count = match mesh {
-            Some(mesh) => mesh.primitives.first().map_or(0, |primitive| primitive.targets.len()),
-            None if is_pack(root) => {
-                let keys = self.data.count(sampler.input, user)?.max(1);
-                let rows =
-                    if interpolation(sampler, user)? == Interpolation::CubicSpline { 3 * keys } else { keys };
-                (self.data.count(sampler.output, user)? / rows) as usize
-            }
-            None => 0,
-        };
+        let count = mesh.and_then(|mesh| mesh.primitives.first()).map_or(0, |it| it.targets.len());
         if count > 0 {
             Ok(count)
         } else {
@@ -398,16 +420,6 @@ fn interpolation(sampler: &AnimationSampler, place: &str) -> Result<Interpolatio
     }
 }
 
-fn is_pack(root: &Root) -> bool {
-    root.asset.generator.as_deref() == Some(GENERATOR)
-}
-
-/// A pack's nodes have no morph targets, so it names a node that had some where other readers do not look.
-fn morphed_node(root: &Root, target: &schema::ChannelTarget) -> Option<usize> {
-    let node = target.extras.as_ref().filter(|_| is_pack(root))?.get("node")?.as_u64()?;
-    usize::try_from(node).ok()
-}
-
 fn check_movable(root: &Root, target: Target, node: usize, place: &str) -> Result<(), SceneError> {
     let sets_part =
         matches!(target, Target::Translation { .. } | Target::Rotation { .. } | Target::Scale { .. });
@@ -462,7 +474,7 @@ fn node_target(path: &str, node: usize) -> Option<Target> {
         "translation" => Target::Translation { node },
         "rotation" => Target::Rotation { node },
         "scale" => Target::Scale { node },
-        "weights" => Target::Weights { node },
+        "weights" => Target::Weights { morph: node },
         "extensions/KHR_node_visibility/visible" => Target::Visibility { node },
         _ => return None,
     })

@@ -1,6 +1,6 @@
 //! Animations as typed data: what moves, along which curve, and what a curve says at a time.
 //!
-//! Nothing here plays: a scene is its rest pose, and a player samples a [`Curve`] and sets what the
+//! Nothing here plays: a scene is its rest pose, and a player (`play`) samples a [`Curve`] and sets what the
 //! [`Target`] names. Source: glTF 2.0, section 3.11 and appendix C; `KHR_animation_pointer`.
 
 use glam::DQuat;
@@ -45,10 +45,10 @@ pub enum Target {
         /// Index into [`crate::Scene::nodes`].
         node: usize,
     },
-    /// One weight for each morph target.
+    /// One weight for each morph target of a draw.
     Weights {
-        /// Index into [`crate::Scene::nodes`].
-        node: usize,
+        /// Index into [`crate::Scene::morphs`].
+        morph: usize,
     },
     /// 0 hides the node and what hangs on it, 1 shows it.
     Visibility {
@@ -115,7 +115,37 @@ struct Hermite {
     end_tangent: f64,
 }
 
+impl Animation {
+    /// Time of the last key in seconds; playing it again starts from 0.
+    pub fn duration_s(&self) -> f32 {
+        let last = self.curves.iter().filter_map(|curve| curve.times_s.last().copied());
+        last.fold(0.0, f32::max)
+    }
+}
+
 impl Curve {
+    /// Whether the value ever differs from `rest`. Rotations are compared as rotations: quaternions of either sign and
+    /// of any length, with what rounding leaves.
+    pub(crate) fn departs_from(&self, rest: &[f32]) -> bool {
+        if !self.is_rotation {
+            let is_at_rest = |(range, rest): ([f32; 2], &f32)| range[0] == *rest && range[1] == *rest;
+            return !self.range().into_iter().zip(rest).all(is_at_rest);
+        }
+        let rest = quaternion(rest);
+        let is_rest = |key: usize| quaternion(self.key(key)).dot(rest).abs() > 1.0 - 1e-12;
+        let tangents = (0..self.values.len() / self.width.max(1))
+            .filter(|row| self.interpolation == Interpolation::CubicSpline && row % 3 != 1);
+        let bends = tangents.into_iter().any(|row| self.row(row).iter().any(|&value| value != 0.0));
+        bends || !(0..self.times_s.len()).all(is_rest)
+    }
+
+    /// The curve of some of its components.
+    pub(crate) fn components(&self, wanted: &[usize]) -> Curve {
+        let rows = self.values.chunks_exact(self.width.max(1));
+        let values = rows.flat_map(|row| wanted.iter().map(|&component| row[component])).collect();
+        Curve { width: wanted.len(), values, times_s: self.times_s.clone(), ..*self }
+    }
+
     /// Writes the value at `time_s` to `value`, which has [`width`](Self::width) places. Before the first key
     /// and after the last one their values hold. Computed in `f64`.
     pub fn sample(&self, time_s: f64, value: &mut [f32]) {

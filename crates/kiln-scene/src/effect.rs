@@ -6,7 +6,7 @@ use crate::{Effect, EffectSet};
 
 impl Effect {
     /// Every effect, in the order of their names.
-    pub const ALL: [Effect; 17] = [
+    pub const ALL: [Effect; 20] = [
         Effect::AlphaBlend,
         Effect::AlphaMask,
         Effect::Anisotropy,
@@ -14,11 +14,14 @@ impl Effect {
         Effect::DiffuseTransmission,
         Effect::Dispersion,
         Effect::Emission,
+        Effect::Instancing,
         Effect::Iridescence,
+        Effect::Morph,
         Effect::NormalMap,
         Effect::Occlusion,
         Effect::PunctualLights,
         Effect::Sheen,
+        Effect::Skin,
         Effect::Specular,
         Effect::Transmission,
         Effect::Unlit,
@@ -36,17 +39,25 @@ impl Effect {
             Effect::DiffuseTransmission => "diffuse_transmission",
             Effect::Dispersion => "dispersion",
             Effect::Emission => "emission",
+            Effect::Instancing => "instancing",
             Effect::Iridescence => "iridescence",
+            Effect::Morph => "morph",
             Effect::NormalMap => "normal_map",
             Effect::Occlusion => "occlusion",
             Effect::PunctualLights => "punctual_lights",
             Effect::Sheen => "sheen",
+            Effect::Skin => "skin",
             Effect::Specular => "specular",
             Effect::Transmission => "transmission",
             Effect::Unlit => "unlit",
             Effect::VertexColor => "vertex_color",
             Effect::Volume => "volume",
         }
+    }
+
+    /// Whether vertices call for it, not a material.
+    pub fn is_of_geometry(self) -> bool {
+        matches!(self, Effect::Instancing | Effect::Morph | Effect::Skin)
     }
 
     /// The effect of that [`name`](Effect::name).
@@ -59,7 +70,7 @@ impl Effect {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct EffectOverrides {
-    /// Every material has these.
+    /// Every material has these, but for [those of geometry](Effect::is_of_geometry): no setting gives a mesh joints.
     pub force: EffectSet,
     /// No material has these.
     pub forbid: EffectSet,
@@ -68,7 +79,8 @@ pub struct EffectOverrides {
 impl EffectOverrides {
     /// The effects that a material is drawn with.
     pub fn apply(&self, effects: &EffectSet) -> EffectSet {
-        effects.union(&self.force).filter(|effect| !self.forbid.contains(effect)).copied().collect()
+        let forced = self.force.iter().filter(|effect| !effect.is_of_geometry());
+        effects.iter().chain(forced).filter(|effect| !self.forbid.contains(effect)).copied().collect()
     }
 }
 

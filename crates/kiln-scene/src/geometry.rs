@@ -1,10 +1,11 @@
-//! Attributes of one primitive, morphed and skinned, as vertices.
+//! Attributes of one primitive as vertices, morphed and skinned to the rest pose where nothing moves them.
 
 use std::collections::BTreeMap;
 
-use glam::{DMat3, DMat4, DVec3};
+use glam::DMat4;
 
 use crate::accessor::Data;
+use crate::deform::{Influence, MorphDelta, MorphTarget, move_vertex};
 use crate::schema::Primitive;
 use crate::shape::Geometry;
 use crate::topology::{Topology, triangulate};
@@ -22,6 +23,12 @@ pub(crate) const NEUTRAL: Vertex = Vertex {
 
 /// Several times what rounding four weights leaves; the sum is scaled to 1 in any case.
 const WEIGHT_SUM_TOLERANCE: f64 = 1e-5;
+
+/// Weights whose sum is this close to 1 keep their bits: scaling four weights once more leaves less.
+const SCALED_SUM_TOLERANCE: f64 = 1e-6;
+
+/// Share of a vertex's weights that may be dropped without a word.
+const DROPPED_SHARE_MAX: f64 = 0.01;
 
 /// What the material reads; the rest is neither read nor stored.
 #[derive(Clone, Copy, Debug, Default)]
@@ -47,7 +54,10 @@ impl Needs {
 /// How the primitive is deformed before it is placed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Deformation<'a> {
+    /// Weights at rest.
     pub weights: &'a [f32],
+    /// Targets to keep for weights that change; with none the vertices are morphed to the rest pose.
+    pub live: &'a [usize],
     pub placing: Placing<'a>,
 }
 
@@ -56,7 +66,9 @@ pub(crate) struct Deformation<'a> {
 pub(crate) enum Placing<'a> {
     /// By the draw's matrix.
     Instance,
-    /// By joints (skin space to world for each): the vertices are in world space then.
+    /// By this many joints that move.
+    Joints(usize),
+    /// By joints at rest (skin space to world for each): the vertices are in world space then.
     Skin(&'a [DMat4]),
     /// By a matrix that no draw can have, because it flattens and normals have no inverse of it.
     Flattened(DMat4),
@@ -66,10 +78,23 @@ pub(crate) enum Placing<'a> {
 #[derive(Debug)]
 pub(crate) struct Budget {
     pub steps_left: usize,
+    /// See [`limits::MORPH_DELTA_COUNT_MAX`].
+    pub deltas_left: usize,
 }
 
 impl Budget {
-    fn spend(&mut self, steps: u64, pointer: &str) -> Result<(), SceneError> {
+    pub fn new() -> Self {
+        Budget { steps_left: limits::POSE_STEP_COUNT_MAX, deltas_left: limits::MORPH_DELTA_COUNT_MAX }
+    }
+
+    pub fn spend_deltas(&mut self, count: usize, pointer: &str) -> Result<(), SceneError> {
+        let limit = limits::MORPH_DELTA_COUNT_MAX;
+        let fault = || SceneError::new(pointer, format!("the vertices of all morph targets exceed {limit}"));
+        self.deltas_left = self.deltas_left.checked_sub(count).ok_or_else(fault)?;
+        Ok(())
+    }
+
+    pub fn spend(&mut self, steps: u64, pointer: &str) -> Result<(), SceneError> {
         let left = usize::try_from(steps).ok().and_then(|steps| self.steps_left.checked_sub(steps));
         let limit = limits::POSE_STEP_COUNT_MAX;
         let fault = || {
@@ -120,16 +145,31 @@ pub(crate) fn read(
         Topology::Unknown => return Err(SceneError::new(format!("{pointer}/mode"), "no mode of glTF 2.0")),
     };
     let mut geometry = reader.vertices(needs, indices)?;
-    reader.morph(&mut geometry, deformation.weights, budget)?;
+    match deformation.live {
+        [] => reader.morph(&mut geometry, deformation.weights, budget)?,
+        live => reader.targets(&mut geometry, live, budget)?,
+    }
     match deformation.placing {
         Placing::Instance => {}
+        Placing::Joints(count) => reader.hang(&mut geometry, count, budget)?,
         Placing::Skin(joints) => reader.skin(&mut geometry, joints, budget)?,
         Placing::Flattened(world) => {
-            let (normals, tangents) = (geometry.has_normals, geometry.has_tangents);
-            geometry.vertices.iter_mut().for_each(|vertex| deform(vertex, world, normals, tangents));
+            for at in 0..geometry.vertices.len() {
+                place(&mut geometry, at, world);
+            }
         }
     }
     Ok(Read::Geometry(geometry))
+}
+
+/// Whether a primitive has what a skin needs.
+pub(crate) fn has_joints(primitive: &Primitive) -> bool {
+    ["JOINTS_0", "WEIGHTS_0"].iter().all(|name| primitive.attributes.contains_key(*name))
+}
+
+fn place(geometry: &mut Geometry, at: usize, matrix: DMat4) {
+    let deltas = geometry.targets.iter_mut().map(|(_, target)| &mut target.deltas[at]);
+    move_vertex(&mut geometry.vertices[at], deltas, matrix, geometry.has_normals, geometry.has_tangents);
 }
 
 fn draco_only<'a>(data: &Data<'_>, primitive: &'a Primitive, position: usize) -> Option<&'a str> {
@@ -207,7 +247,7 @@ impl Reader<'_, '_> {
             self.column("TEXCOORD_1", &["VEC2"], &mut vertices, |it, [u, v, ..]| it.uv1 = [u, v])?;
         }
         self.column("COLOR_0", &["VEC3", "VEC4"], &mut vertices, |it, value| it.color = value)?;
-        Ok(Geometry { vertices, indices, has_normals, has_tangents, odd_weight_count: 0 })
+        Ok(Geometry { vertices, indices, has_normals, has_tangents, ..Geometry::default() })
     }
 
     /// Reads an attribute straight into the vertices, which takes no memory besides; an absent one is skipped.
@@ -245,14 +285,60 @@ impl Reader<'_, '_> {
         Ok(())
     }
 
+    /// Reads what weights add, of the `live` targets that add anything.
+    fn targets(
+        &self,
+        geometry: &mut Geometry,
+        live: &[usize],
+        budget: &mut Budget,
+    ) -> Result<(), SceneError> {
+        let found = live.iter().filter_map(|&at| Some((at, self.primitive.targets.get(at)?)));
+        for (at, target) in found {
+            budget.spend(self.count as u64, self.pointer)?;
+            let place = format!("/targets/{at}");
+            let get = |name| self.attribute::<3>(target, &place, name, &["VEC3"], [0.0; 3]);
+            let (positions, normals, tangents) = (get("POSITION")?, get("NORMAL")?, get("TANGENT")?);
+            let normals = normals.filter(|_| geometry.has_normals);
+            let tangents = tangents.filter(|_| geometry.has_tangents);
+            let all = [positions, normals, tangents];
+            if all.iter().flatten().all(|deltas| deltas.as_flattened().iter().all(|&it| it == 0.0)) {
+                continue;
+            }
+            budget.spend_deltas(self.count, self.pointer)?;
+            let mut finite = |deltas: &Option<Vec<[f32; 3]>>, at: usize| {
+                let delta = deltas.as_ref().map_or([0.0; 3], |deltas| deltas[at]);
+                let is_finite = delta.iter().all(|value| value.is_finite());
+                geometry.odd_delta_count += usize::from(!is_finite);
+                if is_finite { delta } else { [0.0; 3] }
+            };
+            let delta = |at| MorphDelta {
+                position: finite(&all[0], at),
+                normal: finite(&all[1], at),
+                tangent: finite(&all[2], at),
+            };
+            let deltas = (0..self.count).map(delta).collect();
+            geometry.targets.push((at, MorphTarget { deltas }));
+        }
+        Ok(())
+    }
+
+    /// Hangs vertices on joints that move.
+    fn hang(&self, geometry: &mut Geometry, joints: usize, budget: &mut Budget) -> Result<(), SceneError> {
+        for pairs in self.influences(joints, budget)? {
+            geometry.odd_weight_count += usize::from(is_odd(&pairs));
+            let (influence, dropped_share) = heaviest(&pairs);
+            geometry.dropped_joint_count += usize::from(dropped_share > DROPPED_SHARE_MAX);
+            geometry.influences.push(influence);
+        }
+        Ok(())
+    }
+
     /// Moves vertices by the weighted joint matrices (glTF 2.0, section 3.7.3.3).
     fn skin(&self, geometry: &mut Geometry, joints: &[DMat4], budget: &mut Budget) -> Result<(), SceneError> {
         let influences = self.influences(joints.len(), budget)?;
-        for (vertex, influence) in geometry.vertices.iter_mut().zip(&influences) {
+        for (at, influence) in influences.iter().enumerate() {
             let total: f64 = influence.iter().map(|&(_, weight)| weight).sum();
-            let is_odd =
-                (total - 1.0).abs() > WEIGHT_SUM_TOLERANCE || influence.iter().any(|(_, it)| *it < 0.0);
-            geometry.odd_weight_count += usize::from(is_odd);
+            geometry.odd_weight_count += usize::from(is_odd(influence));
             // A vertex that no joint holds stays where it was modelled.
             if !(total > 0.0 && total.is_finite()) {
                 continue;
@@ -261,7 +347,7 @@ impl Reader<'_, '_> {
             for &(joint, weight) in influence {
                 blend += joints[joint] * (weight / total);
             }
-            deform(vertex, blend, geometry.has_normals, geometry.has_tangents);
+            place(geometry, at, blend);
         }
         Ok(())
     }
@@ -308,25 +394,31 @@ fn add<const N: usize>(value: &mut [f32; N], delta: Option<[f32; 3]>, weight: f3
     }
 }
 
-/// Moves a vertex; normals and tangents that are absent keep their neutral values.
-fn deform(vertex: &mut Vertex, matrix: DMat4, has_normal: bool, has_tangent: bool) {
-    let wide = |values: [f32; 3]| DVec3::from_array(values.map(f64::from));
-    let narrow = |vector: DVec3| vector.to_array().map(|value| value as f32);
-    vertex.position = narrow(matrix.transform_point3(wide(vertex.position)));
-    let linear = DMat3::from_mat4(matrix);
-    if has_normal {
-        vertex.normal = narrow((cofactor(linear) * wide(vertex.normal)).normalize_or_zero());
-    }
-    if has_tangent {
-        let [x, y, z, handedness] = vertex.tangent;
-        let [x, y, z] = narrow((linear * wide([x, y, z])).normalize_or_zero());
-        vertex.tangent = [x, y, z, handedness];
-    }
+/// Whether weights are negative, no numbers, or do not sum up to 1.
+fn is_odd(pairs: &[(usize, f64)]) -> bool {
+    let total: f64 = pairs.iter().map(|&(_, weight)| weight).sum();
+    total.is_nan() || (total - 1.0).abs() > WEIGHT_SUM_TOLERANCE || pairs.iter().any(|(_, it)| *it < 0.0)
 }
 
-/// Transforms normals like the inverse transpose, but exists for singular matrices too.
-fn cofactor(m: DMat3) -> DMat3 {
-    let cofactor =
-        DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
-    if m.determinant() < 0.0 { -cofactor } else { cofactor }
+/// The four heaviest of a vertex's joints, in the file's order, and the share of those left out. A vertex that no
+/// joint holds hangs on the first: a weight that is missing cannot hold it where it was modelled.
+fn heaviest(pairs: &[(usize, f64)]) -> (Influence, f64) {
+    let usable = |weight: f64| weight > 0.0 && weight.is_finite();
+    let all: Vec<(usize, f64)> = pairs.iter().copied().filter(|&(_, weight)| usable(weight)).collect();
+    let mut order: Vec<usize> = (0..all.len()).collect();
+    order.sort_by(|&a, &b| all[b].1.total_cmp(&all[a].1));
+    order.truncate(4);
+    order.sort_unstable();
+    let sum: f64 = order.iter().map(|&at| all[at].1).sum();
+    let total: f64 = all.iter().map(|&(_, weight)| weight).sum();
+    let scale = if (sum - 1.0).abs() <= SCALED_SUM_TOLERANCE { 1.0 } else { sum };
+    let shares = order.into_iter().map(|at| (all[at].0 as u16, (all[at].1 / scale) as f32));
+    let mut influence = Influence::default();
+    for (at, (joint, weight)) in shares.filter(|(_, weight)| *weight > 0.0).enumerate() {
+        (influence.joints[at], influence.weights[at]) = (joint, weight);
+    }
+    if influence.weights == [0.0; 4] {
+        influence.weights[0] = 1.0;
+    }
+    (influence, if total > 0.0 { 1.0 - sum / total } else { 0.0 })
 }

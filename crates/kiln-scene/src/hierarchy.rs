@@ -1,7 +1,8 @@
 //! The nodes that a moving scene keeps. A scene at rest needs none: its draws stand in the world.
 //!
-//! Kept are the nodes that channels name and what those hang on. Everything between such a node and a draw is
-//! one matrix, so that a pack, where the draw is that node's child, comes out as the same pack again.
+//! Kept are the nodes that channels name, joints of skins that move, and what those hang on. Everything between a
+//! node that channels name and a draw is one matrix, so that a pack, where the draw is that node's child, comes out as
+//! the same pack again.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -42,15 +43,15 @@ pub(crate) struct Place {
     pub local: DMat4,
 }
 
-/// Keeps `named` nodes and what they hang on.
-pub(crate) fn hierarchy(root: &Root, pose: &Pose, named: &BTreeSet<usize>) -> Hierarchy {
-    let mut wanted = BTreeSet::new();
-    for &node in named {
-        let mut next = Some(node);
-        while let Some(node) = next.filter(|node| wanted.insert(*node)) {
-            next = pose.parents[node];
-        }
-    }
+/// Keeps `named` nodes, `joints`, and what they hang on.
+pub(crate) fn hierarchy(
+    root: &Root,
+    pose: &Pose,
+    named: &BTreeSet<usize>,
+    joints: &BTreeSet<usize>,
+) -> Hierarchy {
+    let carriers = with_ancestors(pose, named);
+    let wanted = with_ancestors(pose, &named.union(joints).copied().collect());
     let mut hierarchy = Hierarchy::default();
     for &node in pose.order.iter().filter(|node| wanted.contains(node)) {
         let source = &root.nodes[node];
@@ -72,15 +73,32 @@ pub(crate) fn hierarchy(root: &Root, pose: &Pose, named: &BTreeSet<usize>) -> Hi
         });
         hierarchy.moves.push(moves);
     }
-    hierarchy.held = held(root, pose, &hierarchy);
+    hierarchy.held = held(root, pose, &hierarchy, &carriers);
     hierarchy
 }
 
-/// Nodes that move; large files have few, so the others take no memory.
-fn held(root: &Root, pose: &Pose, hierarchy: &Hierarchy) -> BTreeMap<usize, Held> {
+fn with_ancestors(pose: &Pose, nodes: &BTreeSet<usize>) -> BTreeSet<usize> {
+    let mut found = BTreeSet::new();
+    for &node in nodes {
+        let mut next = Some(node);
+        while let Some(node) = next.filter(|node| found.insert(*node)) {
+            next = pose.parents[node];
+        }
+    }
+    found
+}
+
+/// Nodes that move; large files have few, so the others take no memory. What is kept for its joints alone carries
+/// nothing: its skin may turn out not to be drawn.
+fn held(
+    root: &Root,
+    pose: &Pose,
+    hierarchy: &Hierarchy,
+    carriers: &BTreeSet<usize>,
+) -> BTreeMap<usize, Held> {
     let mut found = BTreeMap::new();
     for &node in &pose.order {
-        if let Some(&kept) = hierarchy.kept.get(&node) {
+        if let Some(&kept) = hierarchy.kept.get(&node).filter(|_| carriers.contains(&node)) {
             if hierarchy.moves[kept] {
                 found.insert(node, Held { kept, carrier: node, local: DMat4::IDENTITY });
             }
@@ -98,6 +116,29 @@ fn held(root: &Root, pose: &Pose, hierarchy: &Hierarchy) -> BTreeMap<usize, Held
 }
 
 impl Hierarchy {
+    /// Keeps `used` nodes and what they hang on alone; returns the new number of each.
+    pub fn retain(&mut self, mut used: BTreeSet<usize>) -> Vec<usize> {
+        for node in (0..self.nodes.len()).rev() {
+            if used.contains(&node) {
+                used.extend(self.nodes[node].parent);
+            }
+        }
+        let mut next = 0..;
+        let numbers: Vec<usize> = (0..self.nodes.len())
+            .map(|node| if used.contains(&node) { next.next().unwrap_or(0) } else { usize::MAX })
+            .collect();
+        let mut at = 0..;
+        self.nodes.retain(|_| at.next().is_some_and(|node| used.contains(&node)));
+        for node in &mut self.nodes {
+            node.parent = node.parent.map(|parent| numbers[parent]);
+        }
+        self.kept.retain(|_, node| {
+            *node = numbers[*node];
+            *node != usize::MAX
+        });
+        numbers
+    }
+
     /// Where a node of the file stands.
     pub fn place(&self, pose: &Pose, node: usize) -> Place {
         match self.held.get(&node) {
@@ -111,6 +152,11 @@ impl Hierarchy {
 }
 
 impl Place {
+    /// In the world, seen when the node is.
+    pub fn seen_with(self) -> Place {
+        Place { local: DMat4::IDENTITY, ..self }
+    }
+
     /// In the world.
     pub fn still(world: DMat4) -> Place {
         Place { node: None, base: DMat4::IDENTITY, local: world }

@@ -2,23 +2,30 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use glam::{DMat3, DMat4, DVec3, Mat4};
+use glam::{DMat4, DVec3, Mat4};
 
 use crate::accessor::{Data, fetch_buffers};
 use crate::animate::{self, Motion, Renumbering, retarget};
 use crate::document::Document;
-use crate::geometry::{self, Budget, Deformation, Needs, Placing, Read};
+use crate::geometry::{Budget, Needs, Placing, has_joints};
 use crate::hierarchy::{Hierarchy, Place, carry, hierarchy, rounded};
+use crate::import::order::{order_morphs, order_nodes, order_primitives, order_skins, world_bounds};
+use crate::import::parts::{Look, Part};
 use crate::material_table::{MaterialTable, Settled};
-use crate::pose::{Pose, joint_matrices, pose};
+use crate::movement::{Movement, movement, rest_weights};
+use crate::pose::{Binding, Pose, binding, is_singular, pose, vanishes};
 use crate::textures::TextureTable;
 use crate::uri::References;
 use crate::write::GENERATOR;
 use crate::{
-    Bounds, Camera, Draw, Item, Light, LightReads, Primitive, Scene, SceneError, SpecularGlossinessAs,
-    VariantMaterial,
+    Camera, Draw, Instance, Item, Light, LightReads, Scene, SceneError, Skin, SpecularGlossinessAs, conform,
+    extensions, limits, rig, schema, variants,
 };
-use crate::{conform, extensions, limits, rig, schema, shape, variants};
+
+#[path = "import_order.rs"]
+mod order;
+#[path = "import_parts.rs"]
+mod parts;
 
 /// A scene, and the parts of the file that a pack needs besides.
 #[derive(Debug, Default)]
@@ -62,17 +69,22 @@ pub(crate) fn import(
     // What is left out because of a fault is said there, and once.
     faults.retain(|fault| motion.warnings.iter().all(|warning| warning.pointer != fault.pointer));
     let textures = TextureTable::new(References { file, allowed_folders, read }, &data);
+    let movement = movement(root, &pose, &motion);
     let importer = Importer {
         data: &data,
         pose: &pose,
-        hierarchy: hierarchy(root, &pose, &motion.nodes()),
+        hierarchy: hierarchy(root, &pose, &motion.nodes(), &movement.joints(root, &pose)),
+        movement,
         materials: MaterialTable::new(root, textures, motion.material_ranges(), specular_glossiness),
         motion,
         scene: Scene { variants: variants::names(root), ..Scene::default() },
         needs: Vec::new(),
         parts: BTreeMap::new(),
         mirrored: BTreeMap::new(),
-        budget: Budget { steps_left: limits::POSE_STEP_COUNT_MAX },
+        skins: BTreeMap::new(),
+        morphs: Vec::new(),
+        instances_left: limits::INSTANCE_COUNT_MAX,
+        budget: Budget::new(),
         vertex_count: 0,
         index_count: 0,
         notes: Notes::default(),
@@ -102,6 +114,7 @@ impl Notes {
 }
 
 /// How a mesh stands in the scene.
+#[derive(Clone)]
 struct Standing {
     place: Place,
     name: String,
@@ -113,14 +126,20 @@ struct Importer<'a, 'b> {
     pose: &'a Pose,
     hierarchy: Hierarchy,
     motion: Motion,
+    movement: Movement,
     materials: MaterialTable<'a, 'b>,
     scene: Scene,
     /// What the materials of each of the scene's primitives read.
     needs: Vec<Needs>,
-    /// Scene primitive of a file's (mesh, primitive), where it looks the same wherever it stands.
-    parts: BTreeMap<(usize, usize), Option<usize>>,
+    /// Scene primitives by how they look, wherever they stand.
+    parts: BTreeMap<Look, Option<Part>>,
     /// Mirror image of a scene primitive.
     mirrored: BTreeMap<usize, usize>,
+    /// Scene skin by the file's.
+    skins: BTreeMap<usize, usize>,
+    /// What the draws' `morph` index.
+    morphs: Vec<Morph>,
+    instances_left: usize,
     budget: Budget,
     vertex_count: usize,
     index_count: usize,
@@ -129,6 +148,15 @@ struct Importer<'a, 'b> {
     hidden: Vec<(Place, Draw)>,
     cameras: Vec<(Place, FoundCamera)>,
     lights: Vec<(Place, FoundLight)>,
+}
+
+/// What moves the vertices of a draw.
+struct Morph {
+    node: usize,
+    /// The file's targets.
+    targets: Vec<usize>,
+    /// Rest weights of those.
+    weights: Vec<f32>,
 }
 
 /// A node's camera and the file's index of it.
@@ -169,7 +197,12 @@ impl Importer<'_, '_> {
         self.scene.cameras = cameras.iter().map(|it| it.camera.clone()).collect();
         self.scene.lights = lights.iter().map(|it| it.light.clone()).collect();
         order_primitives(&mut self.scene);
-        self.scene.bounds = world_bounds(&self.scene);
+        order_skins(&mut self.scene);
+        order_nodes(&mut self.scene, &mut self.hierarchy, &self.motion.nodes());
+        let morphs = order_morphs(&mut self.scene, &self.morphs);
+        self.scene.sources.lights = lights.iter().map(|it| it.source.clone()).collect();
+        self.scene.nodes = std::mem::take(&mut self.hierarchy.nodes);
+        self.scene.bounds = world_bounds(&self.scene, &mut self.budget)?;
         let Settled { materials, flat, reads, textures, samplers, pictures, notes, mut warnings, moving } =
             self.materials.settle(&mut self.scene, !lights.is_empty());
         notes.into_iter().for_each(|note| self.notes.push(note));
@@ -180,9 +213,9 @@ impl Importer<'_, '_> {
             materials: &moving,
             cameras: copies(cameras.iter().map(|it| it.index)),
             lights: copies(lights.iter().map(|it| it.index)),
+            morphs: by_node(&morphs),
         };
         self.scene.animations = retarget(self.motion.animations, &|target| renumbering.apply(target));
-        self.scene.nodes = self.hierarchy.nodes;
         // A pack says what its source lacked; places in the pack itself mean nothing to the author.
         self.scene.notes = remembered_notes(root).unwrap_or(self.notes.list);
         Ok(Imported {
@@ -230,206 +263,183 @@ impl Importer<'_, '_> {
         let Some(mesh) = node.mesh else { return Ok(()) };
         let place = self.hierarchy.place(self.pose, index);
         let name = node.name.clone().unwrap_or_else(|| format!("node {index}"));
-        match &node.extensions.instancing {
-            None => self.add_mesh(index, mesh, &Standing { place, name, shown }),
-            Some(instancing) => {
-                for (at, local) in rig::instances(self.data, index, instancing)?.into_iter().enumerate() {
-                    let (place, name) = (place.then(local), format!("{name} {at}"));
-                    self.add_mesh(index, mesh, &Standing { place, name, shown })?;
-                }
-                Ok(())
+        let standing = Standing { place, name, shown };
+        let parts = self.primitives(index, mesh)?;
+        let instancing = node.extensions.instancing.as_ref();
+        let Some(instancing) = instancing.filter(|_| node.skin.is_none()) else {
+            if instancing.is_some() {
+                let what = "its joints place it, so its instances are one";
+                self.notes.push(format!("node `{}`: {what}", standing.name));
             }
-        }
+            return (0..parts).try_for_each(|at| self.add_draw(index, (mesh, at), &standing));
+        };
+        let (instances, remark) = rig::instances(self.data, index, instancing, self.instances_left)?;
+        self.instances_left -= instances.len();
+        remark.into_iter().for_each(|remark| self.notes.push(remark));
+        (0..parts).try_for_each(|at| self.add_instances(index, (mesh, at), &standing, &instances))
     }
 
-    fn add_mesh(&mut self, node: usize, mesh: usize, standing: &Standing) -> Result<(), SceneError> {
+    /// Number of primitives of a node's mesh.
+    fn primitives(&self, node: usize, mesh: usize) -> Result<usize, SceneError> {
         let user = format!("/nodes/{node}/mesh");
         let count = self.data.root.meshes.len();
         let source = self.data.root.meshes.get(mesh);
         let source = source.ok_or_else(|| {
             SceneError::new(user, format!("mesh {mesh} does not exist, the file has {count}"))
         })?;
-        if !standing.place.world().is_finite() {
-            self.notes.push(format!("node `{}` is not drawn: its place is not finite", standing.name));
-            return Ok(());
-        }
-        for at in 0..source.primitives.len() {
-            if self.draws.len() + self.hidden.len() >= limits::DRAW_COUNT_MAX {
-                let limit = limits::DRAW_COUNT_MAX;
-                return Err(SceneError::new(format!("/nodes/{node}"), format!("more than {limit} draws")));
-            }
-            self.add_draw(node, (mesh, at), standing)?;
-        }
-        Ok(())
+        Ok(source.primitives.len())
     }
 
-    fn add_draw(&mut self, node: usize, part: (usize, usize), standing: &Standing) -> Result<(), SceneError> {
-        // Decided on what the draw will hold, so that a pack decides alike.
-        let mut place = standing.place;
-        let world = rounded(place.world());
-        if place.node.is_none() {
-            place.local = world;
-        }
-        let shown = standing.shown && !(place.node.is_some() && vanishes(world));
-        let skin = self.data.root.nodes[node].skin;
-        let weights = self.data.root.nodes[node].weights.is_some();
-        let bake = skin.is_none() && shown && is_singular(world);
-        if skin.is_some() || bake {
-            return self.add_baked(node, part, skin, world, standing);
-        }
-        let shared = if weights { None } else { self.parts.get(&part).copied() };
-        let primitive = match shared {
-            Some(primitive) => primitive,
-            None => self.read_primitive(node, part, Placing::Instance)?,
-        };
-        if !weights {
-            self.parts.insert(part, primitive);
-        }
-        let Some(mut primitive) = primitive else { return Ok(()) };
-        if world.determinant() < 0.0 {
-            primitive = self.mirrored(primitive)?;
-            place = place.then(DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0)));
-        }
-        let draw = Draw { primitive, world: place.world().as_mat4(), name: standing.name.clone() };
-        let list = if shown { &mut self.draws } else { &mut self.hidden };
-        list.push((place, draw));
-        Ok(())
-    }
-
-    /// A draw whose vertices are in world space: it stays where it is at rest.
-    fn add_baked(
+    /// Copies that can be drawn together are one draw; those that must be sorted or are flat are draws of their own.
+    fn add_instances(
         &mut self,
         node: usize,
         part: (usize, usize),
-        skin: Option<usize>,
-        world: DMat4,
+        standing: &Standing,
+        instances: &[Instance],
+    ) -> Result<(), SceneError> {
+        let world = rounded(standing.place.world());
+        let blends = self.blends(part)?;
+        let placed = |at: &usize| world * rig::matrix(&instances[*at]);
+        let is_solid = |at: &usize| !blends && placed(at).is_finite() && !is_singular(placed(at));
+        let solid: Vec<usize> = (0..instances.len()).filter(is_solid).collect();
+        let (mirrored, upright): (Vec<usize>, Vec<usize>) =
+            solid.into_iter().partition(|at| placed(at).determinant() < 0.0);
+        let mut alone: BTreeSet<usize> = (0..instances.len()).collect();
+        for (group, is_mirrored) in [(upright, false), (mirrored, true)] {
+            if group.len() > 1 {
+                alone.retain(|at| group.binary_search(at).is_err());
+                let group = group.into_iter().map(|at| instances[at]).collect();
+                self.add_group(node, part, standing, group, is_mirrored)?;
+            }
+        }
+        for at in alone {
+            let place = standing.place.then(rig::matrix(&instances[at]));
+            let name = format!("{} {at}", standing.name);
+            self.add_draw(node, part, &Standing { place, name, ..*standing })?;
+        }
+        Ok(())
+    }
+
+    fn add_group(
+        &mut self,
+        node: usize,
+        part: (usize, usize),
+        standing: &Standing,
+        mut instances: Vec<Instance>,
+        is_mirrored: bool,
+    ) -> Result<(), SceneError> {
+        let Some(mut found) = self.part(node, part, None)? else { return Ok(()) };
+        if is_mirrored {
+            found.primitive = self.mirrored(found.primitive)?;
+            instances.iter_mut().for_each(|instance| instance.scale[0] = -instance.scale[0]);
+        }
+        let draw = Draw { instances, ..self.draw(node, found, standing) };
+        self.push_draw(node, standing.place, draw, standing.shown)
+    }
+
+    fn add_draw(&mut self, node: usize, part: (usize, usize), standing: &Standing) -> Result<(), SceneError> {
+        if let Some(skin) = self.data.root.nodes[node].skin {
+            return self.add_skinned(node, part, skin, standing);
+        }
+        // Decided on what the draw will hold, so that a pack decides alike.
+        let mut place = standing.place;
+        if !place.world().is_finite() {
+            self.notes.push(format!("node `{}` is not drawn: its place is not finite", standing.name));
+            return Ok(());
+        }
+        let world = rounded(place.world());
+        let shown = standing.shown && !(place.node.is_some() && vanishes(world));
+        if shown && is_singular(world) {
+            let found = self.baked(node, part, Placing::Flattened(world))?;
+            return self.add_still(node, found, standing);
+        }
+        let Some(mut found) = self.part(node, part, None)? else { return Ok(()) };
+        if world.determinant() < 0.0 {
+            if place.node.is_none() {
+                place = Place::still(world);
+            }
+            found.primitive = self.mirrored(found.primitive)?;
+            place = place.then(DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0)));
+        }
+        let draw = self.draw(node, found, standing);
+        self.push_draw(node, place, draw, shown)
+    }
+
+    fn add_skinned(
+        &mut self,
+        node: usize,
+        part: (usize, usize),
+        skin: usize,
         standing: &Standing,
     ) -> Result<(), SceneError> {
+        let (mesh, at) = part;
+        let pointer = format!("/nodes/{node}/skin");
+        let binding = binding(self.data, skin, &pointer)?;
+        self.budget.spend(binding.joints.len() as u64, &pointer)?;
+        if binding.odd_count > 0 {
+            let what = "inverse bind matrices are not finite and count as the identity";
+            self.notes.push(format!("/skins/{skin}/inverseBindMatrices: {} {what}", binding.odd_count));
+        }
+        let jointed = has_joints(&self.data.root.meshes[mesh].primitives[at]);
+        if !(jointed && self.movement.keeps_skin(node, skin)) {
+            let joints = binding.matrices(&self.pose.worlds);
+            let found = self.baked(node, part, Placing::Skin(&joints))?;
+            return self.add_still(node, found, standing);
+        }
+        let Some(found) = self.part(node, part, Some(binding.joints.len()))? else { return Ok(()) };
+        let skin = Some(self.skin(skin, &binding));
+        let draw = Draw { skin, ..self.draw(node, found, standing) };
+        let seen = standing.place.seen_with();
+        let place = if self.movement.blinks(node) { seen } else { Place::still(DMat4::IDENTITY) };
+        self.push_draw(node, place, draw, standing.shown)
+    }
+
+    /// The scene's number of a skin.
+    fn skin(&mut self, index: usize, binding: &Binding) -> usize {
+        let (skins, kept) = (&mut self.scene.skins, &self.hierarchy.kept);
+        *self.skins.entry(index).or_insert_with(|| {
+            skins.push(Skin {
+                joints: binding.joints.iter().map(|joint| kept[joint]).collect(),
+                inverse_binds: binding.inverse_binds.iter().map(DMat4::as_mat4).collect(),
+            });
+            skins.len() - 1
+        })
+    }
+
+    /// A draw whose vertices are in world space: it stays where it is at rest.
+    fn add_still(&mut self, node: usize, found: Option<Part>, standing: &Standing) -> Result<(), SceneError> {
+        let Some(found) = found else { return Ok(()) };
         if !standing.shown {
             self.notes.push(format!("node `{}` is invisible at rest and is left out", standing.name));
             return Ok(());
         }
-        let joints = match skin {
-            Some(skin) => joint_matrices(self.data, &self.pose.worlds, skin, &format!("/nodes/{node}/skin"))?,
-            None => Vec::new(),
-        };
-        let placing = if skin.is_some() { Placing::Skin(&joints) } else { Placing::Flattened(world) };
-        if let Some(primitive) = self.read_primitive(node, part, placing)? {
-            let draw = Draw { primitive, world: Mat4::IDENTITY, name: standing.name.clone() };
-            self.draws.push((Place::still(DMat4::IDENTITY), draw));
+        let draw = self.draw(node, found, standing);
+        self.push_draw(node, Place::still(DMat4::IDENTITY), draw, true)
+    }
+
+    /// A draw that has no place yet.
+    fn draw(&mut self, node: usize, part: Part, standing: &Standing) -> Draw {
+        let Part { primitive, live: targets } = part;
+        let morph = (!targets.is_empty()).then(|| {
+            let rest = rest_weights(self.data.root, &self.data.root.nodes[node]);
+            let weights = targets.iter().map(|&at| rest.get(at).copied().unwrap_or(0.0)).collect();
+            self.morphs.push(Morph { node, targets, weights });
+            self.morphs.len() - 1
+        });
+        let name = standing.name.clone();
+        Draw { primitive, world: Mat4::IDENTITY, name, skin: None, morph, instances: Vec::new() }
+    }
+
+    fn push_draw(&mut self, node: usize, place: Place, draw: Draw, shown: bool) -> Result<(), SceneError> {
+        if self.draws.len() + self.hidden.len() >= limits::DRAW_COUNT_MAX {
+            let limit = limits::DRAW_COUNT_MAX;
+            return Err(SceneError::new(format!("/nodes/{node}"), format!("more than {limit} draws")));
         }
+        let world = if draw.skin.is_some() { Mat4::IDENTITY } else { place.world().as_mat4() };
+        let list = if shown { &mut self.draws } else { &mut self.hidden };
+        list.push((place, Draw { world, ..draw }));
         Ok(())
-    }
-
-    fn mirrored(&mut self, primitive: usize) -> Result<usize, SceneError> {
-        if let Some(&known) = self.mirrored.get(&primitive) {
-            return Ok(known);
-        }
-        let source = &self.scene.primitives[primitive];
-        let material = source.material;
-        let needs = self.needs[primitive];
-        let (vertices, indices) =
-            shape::mirrored(&source.vertices, &source.indices, needs.tangents.is_some());
-        let index = self.push_primitive(vertices, indices, material, needs, "")?;
-        let variants = self.scene.variant_materials.iter().filter(|it| it.primitive == primitive);
-        let variants: Vec<_> =
-            variants.map(|it| VariantMaterial { primitive: index, ..it.clone() }).collect();
-        self.scene.variant_materials.extend(variants);
-        self.mirrored.insert(primitive, index);
-        Ok(index)
-    }
-
-    fn read_primitive(
-        &mut self,
-        node: usize,
-        (mesh, at): (usize, usize),
-        placing: Placing<'_>,
-    ) -> Result<Option<usize>, SceneError> {
-        let source = &self.data.root.meshes[mesh];
-        let primitive = &source.primitives[at];
-        let pointer = format!("/meshes/{mesh}/primitives/{at}");
-        let slot = self.materials.slot(primitive.material, &pointer)?;
-        let mut needs = self.materials.needs(slot);
-        let mut variant_materials = Vec::new();
-        let mappings = variants::mappings(primitive, self.scene.variants.len(), &pointer)?;
-        for (at, mapping) in mappings.iter().enumerate() {
-            let material = self.materials.slot(Some(mapping.material), &variants::place(&pointer, at))?;
-            needs = needs.or(self.materials.needs(material));
-            let variants = mapping.variants.clone();
-            variant_materials.push(VariantMaterial { primitive: 0, material, variants });
-        }
-        let weights = self.data.root.nodes[node].weights.as_ref().unwrap_or(&source.weights);
-        let deformation = Deformation { weights, placing };
-        match geometry::read(self.data, primitive, &pointer, needs, deformation, &mut self.budget)? {
-            Read::Nothing(why) => {
-                self.notes.push(format!("{pointer} is not drawn: {why}"));
-                Ok(None)
-            }
-            Read::Geometry(geometry) => {
-                self.note_missing_uvs(primitive, needs, &pointer);
-                self.note_restart(primitive, &geometry.indices, &pointer);
-                let (geometry, remarks) = shape::finish(geometry, needs);
-                remarks.into_iter().for_each(|remark| self.notes.push(format!("{pointer}{remark}")));
-                if geometry.indices.is_empty() {
-                    return Ok(None);
-                }
-                let (vertices, indices) = (geometry.vertices, geometry.indices);
-                let index = self.push_primitive(vertices, indices, slot, needs, &pointer)?;
-                let variants =
-                    variant_materials.into_iter().map(|it| VariantMaterial { primitive: index, ..it });
-                self.scene.variant_materials.extend(variants);
-                Ok(Some(index))
-            }
-        }
-    }
-
-    fn note_missing_uvs(&mut self, primitive: &schema::Primitive, needs: Needs, pointer: &str) {
-        for set in 0..2 {
-            let name = format!("TEXCOORD_{set}");
-            if needs.uv[set] && !primitive.attributes.contains_key(&name) {
-                self.notes.push(format!("{pointer}: its material's textures want {name}, which it lacks"));
-            }
-        }
-    }
-
-    /// The largest value of its type in an index means a new strip to a GPU, which glTF does not have.
-    fn note_restart(&mut self, primitive: &schema::Primitive, indices: &[u32], pointer: &str) {
-        let accessor = primitive.indices.and_then(|index| self.data.root.accessors.get(index));
-        let largest = match accessor.map(|accessor| accessor.component_type) {
-            Some(5121) => u32::from(u8::MAX),
-            Some(5123) => u32::from(u16::MAX),
-            _ => return,
-        };
-        if indices.contains(&largest) {
-            self.notes.push(format!("{pointer}/indices: {largest} is reserved; it was read as a vertex"));
-        }
-    }
-
-    fn push_primitive(
-        &mut self,
-        vertices: Vec<crate::Vertex>,
-        indices: Vec<u32>,
-        material: usize,
-        needs: Needs,
-        pointer: &str,
-    ) -> Result<usize, SceneError> {
-        self.vertex_count += vertices.len();
-        self.index_count += indices.len();
-        for (what, count, limit) in [
-            ("vertices", self.vertex_count, limits::VERTEX_COUNT_MAX),
-            ("indices", self.index_count, limits::INDEX_COUNT_MAX),
-        ] {
-            if count > limit {
-                return Err(SceneError::new(
-                    pointer,
-                    format!("{count} {what} so far exceed the limit of {limit}"),
-                ));
-            }
-        }
-        let bounds = shape::bounds(&vertices);
-        self.needs.push(needs);
-        self.scene.primitives.push(Primitive { vertices, indices, material, bounds });
-        Ok(self.scene.primitives.len() - 1)
     }
 }
 
@@ -440,73 +450,18 @@ fn remembered_notes(root: &schema::Root) -> Option<Vec<String>> {
     Some(notes.take(limits::NOTE_COUNT_MAX).map(str::to_owned).collect())
 }
 
+/// Morphing draws by the file's node.
+fn by_node<'a>(morphs: &[&'a Morph]) -> BTreeMap<usize, Vec<(usize, &'a [usize])>> {
+    let mut found: BTreeMap<usize, Vec<(usize, &[usize])>> = BTreeMap::new();
+    for (at, &Morph { node, ref targets, .. }) in morphs.iter().copied().enumerate() {
+        found.entry(node).or_default().push((at, targets));
+    }
+    found
+}
+
 /// The scene's things by the file's that they are copies of.
 fn copies(indices: impl Iterator<Item = usize>) -> BTreeMap<usize, Vec<usize>> {
     let mut copies: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     indices.enumerate().for_each(|(at, index)| copies.entry(index).or_default().push(at));
     copies
-}
-
-/// Shrunk to a line or a point: there is nothing to draw, but an animation may well let it grow.
-fn vanishes(world: DMat4) -> bool {
-    let linear = DMat3::from_mat4(world);
-    let mut lengths = [linear.x_axis, linear.y_axis, linear.z_axis].map(DVec3::length);
-    lengths.sort_by(f64::total_cmp);
-    lengths[1] <= 1e-12 * lengths[2]
-}
-
-/// Flat as far as single precision can say, whatever the scale.
-fn is_singular(world: DMat4) -> bool {
-    let linear = DMat3::from_mat4(world);
-    let lengths = [linear.x_axis, linear.y_axis, linear.z_axis].map(DVec3::length);
-    let (shortest, longest) =
-        (lengths.into_iter().fold(f64::INFINITY, f64::min), lengths.into_iter().fold(0.0, f64::max));
-    let skew = linear.determinant().abs() / lengths.into_iter().product::<f64>();
-    !(shortest > 1e-12 * longest && skew > 1e-6)
-}
-
-/// Keeps the primitives that are drawn, in the order in which they are: one that was only ever mirrored goes.
-fn order_primitives(scene: &mut Scene) {
-    let mut renumbered = BTreeMap::new();
-    for draw in scene.draws.iter_mut().chain(&mut scene.hidden) {
-        let next = renumbered.len();
-        draw.primitive = *renumbered.entry(draw.primitive).or_insert(next);
-    }
-    let mut kept: Vec<(usize, Primitive)> = std::mem::take(&mut scene.primitives)
-        .into_iter()
-        .enumerate()
-        .filter_map(|(old, primitive)| renumbered.get(&old).map(|&new| (new, primitive)))
-        .collect();
-    kept.sort_by_key(|(new, _)| *new);
-    scene.primitives = kept.into_iter().map(|(_, primitive)| primitive).collect();
-    scene.variant_materials.retain_mut(|it| match renumbered.get(&it.primitive) {
-        Some(&primitive) => {
-            it.primitive = primitive;
-            true
-        }
-        None => false,
-    });
-    scene.variant_materials.sort_by_key(|it| it.primitive);
-}
-
-fn world_bounds(scene: &Scene) -> Option<Bounds> {
-    let boxes =
-        scene.draws.iter().map(|draw| transformed(scene.primitives[draw.primitive].bounds, draw.world));
-    boxes.reduce(|a, b| Bounds { min: a.min.min(b.min), max: a.max.max(b.max) })
-}
-
-/// Box around a transformed box (J. Arvo, "Transforming Axis-Aligned Bounding Boxes", Graphics Gems, 1990).
-fn transformed(bounds: Bounds, world: Mat4) -> Bounds {
-    let world = world.as_dmat4();
-    let origin = world.w_axis.truncate();
-    let (mut min, mut max) = (origin, origin);
-    for (axis, (low, high)) in [world.x_axis, world.y_axis, world.z_axis]
-        .into_iter()
-        .zip(bounds.min.to_array().into_iter().zip(bounds.max.to_array()))
-    {
-        let (a, b) = (axis.truncate() * f64::from(low), axis.truncate() * f64::from(high));
-        min += a.min(b);
-        max += a.max(b);
-    }
-    Bounds { min: min.as_vec3(), max: max.as_vec3() }
 }

@@ -26,3 +26,9 @@ pub const NOTE_COUNT_MAX: usize = 256;
 pub const CHANNEL_COUNT_MAX: usize = 1 << 16;
 /// Most times and values of all curves together (128 MB): channels may name one accessor many times.
 pub const CURVE_VALUE_COUNT_MAX: usize = 1 << 25;
+/// Most joints of a skin; vertices name them by 16 bits.
+pub const JOINT_COUNT_MAX: usize = 1 << 16;
+/// Most vertices of all morph targets together (600 MB).
+pub const MORPH_DELTA_COUNT_MAX: usize = 1 << 24;
+/// Most instances of all draws together (40 MB).
+pub const INSTANCE_COUNT_MAX: usize = 1 << 20;

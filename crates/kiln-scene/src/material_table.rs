@@ -10,8 +10,8 @@ use crate::prune::{Pruned, prune, retain_textures, settle};
 use crate::schema::{self, TextureInfo};
 use crate::textures::{Found, TextureTable, sampler};
 use crate::{
-    ColorSpace, Effect, LightReads, Material, MaterialProperty, Scene, SceneError, SpecularGlossinessAs,
-    Texture, TextureRef, extensions, specular_glossiness,
+    AlphaMode, ColorSpace, Effect, LightReads, Material, MaterialProperty, Scene, SceneError,
+    SpecularGlossinessAs, Texture, TextureRef, extensions, specular_glossiness,
 };
 
 pub(crate) struct MaterialTable<'a, 'b> {
@@ -92,6 +92,17 @@ impl<'a, 'b> MaterialTable<'a, 'b> {
         Ok(self.slots.len() - 1)
     }
 
+    /// Whether a slot's material is blended, and its draws are sorted one by one, for vertices with colours or without.
+    pub fn blends(&self, slot: usize, has_colors: bool) -> bool {
+        let pruned = &self.slots[slot].pruned;
+        if parse_alpha_mode(&pruned.material) != Some(AlphaMode::Blend) {
+            return false;
+        }
+        let mut settled = pruned.clone();
+        settle(&mut settled, false, 1.0, &|info| self.textures.range(info));
+        has_colors || settled.effects.contains(&Effect::AlphaBlend)
+    }
+
     /// What a slot's material reads from vertices.
     pub fn needs(&self, slot: usize) -> Needs {
         self.slots[slot].needs
@@ -163,6 +174,10 @@ impl<'a, 'b> MaterialTable<'a, 'b> {
             let mut moving: Vec<MaterialProperty> =
                 self.ranges.get(&index).into_iter().flatten().map(|(property, _)| *property).collect();
             moving.retain(|property| pruned.responds_to(*property));
+            if !moving.is_empty() {
+                let source = settled.materials[settled.flat.len() - 1].clone();
+                scene.sources.materials.insert(settled.flat.len() - 1, source);
+            }
             settled.moving.insert(index, (settled.flat.len() - 1, moving));
         }
         for primitive in &mut scene.primitives {
@@ -178,7 +193,7 @@ impl<'a, 'b> MaterialTable<'a, 'b> {
 }
 
 /// UV set and placement, without a texture.
-fn texture_ref(info: &TextureInfo) -> TextureRef {
+pub(crate) fn texture_ref(info: &TextureInfo) -> TextureRef {
     let transform = transform_rows(info.extensions.transform.as_ref());
     TextureRef { texture: 0, uv_set: uv_set(info), transform }
 }
@@ -255,6 +270,7 @@ impl Numbering {
                 ..schema::Texture::default()
             });
         }
+        scene.sources.textures.clone_from(&self.views);
         for (texture, color_space) in self.views {
             let sampler = sampler(self.textures[texture].sampler);
             scene.textures.push(Texture { image: images[texture], color_space, sampler });

@@ -1,5 +1,6 @@
 //! The crate's two entry points.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use kiln_diagnostic::{Diagnostic, Severity};
@@ -15,7 +16,8 @@ pub struct Packed {
     /// One normalised GLB without outside references: equal inputs give equal bytes, and packing it again
     /// gives the same bytes. `None` if the file cannot be drawn.
     pub glb: Option<Vec<u8>>,
-    /// Materials that some primitive uses, in the order of [`Scene::materials`].
+    /// What draws call for: each material with each distinct set of geometry effects that it is drawn with, in the order
+    /// of [`Scene::materials`], then of sets; materials of variants count.
     pub effects: Vec<MaterialEffects>,
     /// Counts and extent, for people and planners.
     pub summary: SceneSummary,
@@ -24,12 +26,12 @@ pub struct Packed {
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// What one material calls for.
+/// What one material calls for where it is drawn: a shader variant.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MaterialEffects {
     /// Its name; not unique if the file's names are not.
     pub material: String,
-    /// Its effects.
+    /// Its effects and those of the geometry that has it, see [`Scene::effects`].
     pub effects: EffectSet,
     /// What it reads of the environment that lights it.
     pub reads: LightReads,
@@ -50,7 +52,7 @@ pub struct LightReads {
 pub struct SceneSummary {
     /// Distinct geometry.
     pub primitives: usize,
-    /// Instances of primitives.
+    /// Primitives placed in the world; copies of one that are drawn together count once.
     pub draws: usize,
     /// Vertices of distinct geometry.
     pub vertices: usize,
@@ -168,18 +170,25 @@ pub fn load(glb: &[u8]) -> Result<Scene, SceneError> {
 }
 
 fn effects(imported: &Imported) -> Vec<MaterialEffects> {
-    let materials = imported.scene.materials.iter().zip(&imported.reads);
-    materials
-        .map(|(material, &reads)| MaterialEffects {
-            material: material.name.clone(),
-            effects: material.effects.clone(),
-            reads,
-        })
-        .collect()
+    let scene = &imported.scene;
+    let mut materials: Vec<Vec<usize>> = scene.primitives.iter().map(|it| vec![it.material]).collect();
+    for variant in &scene.variant_materials {
+        materials[variant.primitive].push(variant.material);
+    }
+    let draws = scene.draws.iter().chain(&scene.hidden);
+    let pairs = draws.flat_map(|draw| materials[draw.primitive].iter().map(|&it| (it, draw.effects())));
+    let distinct: BTreeSet<(usize, EffectSet)> = pairs.collect();
+    let of_pair = |(material, geometry): (usize, EffectSet)| MaterialEffects {
+        material: scene.materials[material].name.clone(),
+        effects: scene.materials[material].effects.union(&geometry).copied().collect(),
+        reads: imported.reads[material],
+    };
+    distinct.into_iter().map(of_pair).collect()
 }
 
 fn summary(scene: &Scene) -> SceneSummary {
-    let triangles = |draw: &crate::Draw| scene.primitives[draw.primitive].indices.len() / 3;
+    let triangles =
+        |draw: &crate::Draw| scene.primitives[draw.primitive].indices.len() / 3 * draw.instances.len().max(1);
     SceneSummary {
         primitives: scene.primitives.len(),
         draws: scene.draws.len(),

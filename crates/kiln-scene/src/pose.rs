@@ -2,11 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use glam::{DMat4, DQuat, DVec3, DVec4};
+use glam::{DMat3, DMat4, DQuat, DVec3, DVec4};
 
-use crate::SceneError;
 use crate::accessor::Data;
 use crate::schema::{Node, Root};
+use crate::{SceneError, limits};
 
 /// Where every node is, and which ones the scene shows.
 #[derive(Debug)]
@@ -145,40 +145,59 @@ pub(crate) fn trs(translation: DVec3, rotation: [f32; 4], scale: DVec3) -> DMat4
     DMat4::from_scale_rotation_translation(scale, rotation, translation)
 }
 
-/// Skin space to world for each joint of a skin.
+/// A skin of the file.
+#[derive(Debug)]
+pub(crate) struct Binding {
+    /// Nodes of the file.
+    pub joints: Vec<usize>,
+    /// Skin space to joint.
+    pub inverse_binds: Vec<DMat4>,
+    /// Inverse bind matrices that were no numbers and are the identity now.
+    pub odd_count: usize,
+}
+
+/// Reads a skin.
 ///
 /// # Errors
-/// A skin or joint that does not exist, too few inverse bind matrices.
-pub(crate) fn joint_matrices(
-    data: &Data<'_>,
-    worlds: &[DMat4],
-    skin: usize,
-    user: &str,
-) -> Result<Vec<DMat4>, SceneError> {
-    let count = data.root.skins.len();
-    let found = data.root.skins.get(skin);
-    let skin_data = found
-        .ok_or_else(|| SceneError::new(user, format!("skin {skin} does not exist, the file has {count}")))?;
-    let place = format!("/skins/{skin}");
-    let inverse_binds = match skin_data.inverse_bind_matrices {
-        Some(index) => {
-            let matrices = data.floats::<16>(index, &place, &["MAT4"], [0.0; 16])?;
-            matrices.iter().map(|columns| affine(&columns.map(f64::from))).collect()
-        }
-        None => vec![DMat4::IDENTITY; skin_data.joints.len()],
+/// A skin or joint that does not exist, too many joints, too few inverse bind matrices.
+pub(crate) fn binding(data: &Data<'_>, skin: usize, user: &str) -> Result<Binding, SceneError> {
+    let (root, node_count) = (data.root, data.root.nodes.len());
+    let missing = || {
+        let count = root.skins.len();
+        SceneError::new(user, format!("skin {skin} does not exist, the file has {count}"))
     };
-    if inverse_binds.len() < skin_data.joints.len() {
-        let (have, want) = (inverse_binds.len(), skin_data.joints.len());
-        return Err(SceneError::new(place, format!("{have} inverse bind matrices for {want} joints")));
+    let source = root.skins.get(skin).ok_or_else(missing)?;
+    let (place, joints, limit) = (format!("/skins/{skin}"), source.joints.clone(), limits::JOINT_COUNT_MAX);
+    if joints.len() > limit {
+        let reason = format!("{} joints exceed the limit of {limit}", joints.len());
+        return Err(SceneError::new(place + "/joints", reason));
     }
-    let joints = skin_data.joints.iter().zip(inverse_binds).enumerate();
-    joints
-        .map(|(at, (&joint, inverse_bind))| {
-            let world = worlds.get(joint);
-            let place = || format!("{place}/joints/{at}");
-            Ok(*world.ok_or_else(|| missing_node(place(), joint, worlds.len()))? * inverse_bind)
-        })
-        .collect()
+    if let Some(at) = joints.iter().position(|&joint| joint >= node_count) {
+        return Err(missing_node(format!("{place}/joints/{at}"), joints[at], node_count));
+    }
+    let mut inverse_binds = match source.inverse_bind_matrices {
+        None => vec![DMat4::IDENTITY; joints.len()],
+        Some(index) => {
+            let count = data.count(index, &place)?;
+            if count < joints.len() as u64 || count > limit as u64 {
+                let reason = format!("{count} inverse bind matrices for {} joints", joints.len());
+                return Err(SceneError::new(place, reason));
+            }
+            let matrices = data.floats::<16>(index, &place, &["MAT4"], [0.0; 16])?;
+            matrices[..joints.len()].iter().map(|columns| affine(&columns.map(f64::from))).collect()
+        }
+    };
+    let odd = inverse_binds.iter_mut().filter(|matrix| !matrix.is_finite());
+    let odd_count = odd.map(|matrix| *matrix = DMat4::IDENTITY).count();
+    Ok(Binding { joints, inverse_binds, odd_count })
+}
+
+impl Binding {
+    /// Skin space to world for each joint.
+    pub fn matrices(&self, worlds: &[DMat4]) -> Vec<DMat4> {
+        let joints = self.joints.iter().zip(&self.inverse_binds);
+        joints.map(|(&joint, &inverse_bind)| worlds[joint] * inverse_bind).collect()
+    }
 }
 
 /// The fourth row is (0, 0, 0, 1) by the specification; exporters leave rounding noise in it.
@@ -189,4 +208,22 @@ fn affine(columns: &[f64; 16]) -> DMat4 {
     matrix.z_axis.w = 0.0;
     matrix.w_axis = DVec4::new(matrix.w_axis.x, matrix.w_axis.y, matrix.w_axis.z, 1.0);
     matrix
+}
+
+/// Shrunk to a line or a point: there is nothing to draw, but an animation may well let it grow.
+pub(crate) fn vanishes(world: DMat4) -> bool {
+    let linear = DMat3::from_mat4(world);
+    let mut lengths = [linear.x_axis, linear.y_axis, linear.z_axis].map(DVec3::length);
+    lengths.sort_by(f64::total_cmp);
+    lengths[1] <= 1e-12 * lengths[2]
+}
+
+/// Flat as far as single precision can say, whatever the scale.
+pub(crate) fn is_singular(world: DMat4) -> bool {
+    let linear = DMat3::from_mat4(world);
+    let lengths = [linear.x_axis, linear.y_axis, linear.z_axis].map(DVec3::length);
+    let (shortest, longest) =
+        (lengths.into_iter().fold(f64::INFINITY, f64::min), lengths.into_iter().fold(0.0, f64::max));
+    let skew = linear.determinant().abs() / lengths.into_iter().product::<f64>();
+    !(shortest > 1e-12 * longest && skew > 1e-6)
 }

@@ -2,7 +2,7 @@
 //!
 //! The tables list what glTF's object model calls mutable and what a picture depends on.
 
-use crate::schema::{Camera, Light, Material, TextureInfo};
+use crate::schema::{Camera, Light, Material, Spot, TextureInfo};
 
 /// An animated factor of a material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -330,10 +330,26 @@ impl LightProperty {
         if self == L::Color { 3 } else { 1 }
     }
 
+    /// The numbers; a default that the file leaves out is put there.
+    pub(crate) fn values(self, light: &mut Light) -> &mut [f32] {
+        match self {
+            L::Color => &mut light.color,
+            L::Intensity => std::slice::from_mut(&mut light.intensity),
+            L::Range => std::slice::from_mut(light.range.get_or_insert(f32::MAX)),
+            L::InnerConeAngle => std::slice::from_mut(&mut cone(light).inner_cone_angle),
+            L::OuterConeAngle => std::slice::from_mut(&mut cone(light).outer_cone_angle),
+        }
+    }
+
     /// Whether the light is of the kind that has it.
     pub(crate) fn is_of(self, light: &Light) -> bool {
         !matches!(self, L::InnerConeAngle | L::OuterConeAngle) || light.spot.is_some()
     }
+}
+
+fn cone(light: &mut Light) -> &mut Spot {
+    let outer_cone_angle = std::f32::consts::FRAC_PI_4;
+    light.spot.get_or_insert(Spot { inner_cone_angle: 0.0, outer_cone_angle })
 }
 
 fn one(value: &mut f32) -> Option<&mut [f32]> {

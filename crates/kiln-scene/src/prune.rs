@@ -251,7 +251,7 @@ fn unlit(material: Material) -> Material {
 }
 
 /// Brings factors into the ranges of the schema; values outside have no physical meaning.
-fn clamp(material: &mut Material) {
+pub(crate) fn clamp(material: &mut Material) {
     let unit = |value: &mut f32| *value = value.clamp(0.0, 1.0);
     let base = &mut material.pbr_metallic_roughness;
     base.base_color_factor.iter_mut().for_each(unit);

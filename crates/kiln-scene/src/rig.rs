@@ -4,7 +4,7 @@ use glam::{DMat4, DVec3};
 
 use crate::accessor::Data;
 use crate::pose::trs;
-use crate::{Camera, Light, LightKind, LightProperty, SceneError, limits, schema};
+use crate::{Camera, Instance, Light, LightKind, LightProperty, SceneError, limits, schema};
 
 /// A node's camera in world space, and its properties under the name it goes by.
 ///
@@ -46,15 +46,22 @@ pub(crate) fn light(
     let place = format!("/nodes/{node}/extensions/KHR_lights_punctual");
     let source = root.extensions.lights.as_ref().and_then(|lights| lights.lights.get(index));
     let source = source.ok_or_else(|| SceneError::new(place, format!("light {index} does not exist")))?;
+    Ok((placed_light(source, world).map_err(|kind| unknown_kind(&kind, index))?, source.clone()))
+}
+
+/// A light where `world` puts it.
+///
+/// # Errors
+/// The name of a kind that there is not.
+pub(crate) fn placed_light(source: &schema::Light, world: DMat4) -> Result<Light, String> {
     let direction = world.transform_vector3(DVec3::NEG_Z).try_normalize().unwrap_or(DVec3::NEG_Z);
-    let light = Light {
+    Ok(Light {
         intensity: source.color.map(|value| value * source.intensity),
         position: world.w_axis.truncate().as_vec3(),
         direction: direction.as_vec3(),
-        kind: light_kind(source, index)?,
+        kind: light_kind(source)?,
         range: source.range,
-    };
-    Ok((light, source.clone()))
+    })
 }
 
 /// Whether a light does anything, now or at some time of an animation that takes its values through `ranges`.
@@ -75,7 +82,12 @@ pub(crate) fn ever_shines(light: &schema::Light, ranges: &[(LightProperty, Vec<[
     has_power && has_color && has_range && is_open
 }
 
-fn light_kind(source: &schema::Light, index: usize) -> Result<LightKind, SceneError> {
+fn unknown_kind(kind: &str, index: usize) -> SceneError {
+    let place = format!("/extensions/KHR_lights_punctual/lights/{index}/type");
+    SceneError::new(place, format!("`{kind}` is no kind of light"))
+}
+
+fn light_kind(source: &schema::Light) -> Result<LightKind, String> {
     let quarter_pi = std::f32::consts::FRAC_PI_4;
     let spot = source.spot.unwrap_or(schema::Spot { inner_cone_angle: 0.0, outer_cone_angle: quarter_pi });
     match source.kind.as_str() {
@@ -85,38 +97,67 @@ fn light_kind(source: &schema::Light, index: usize) -> Result<LightKind, SceneEr
             let (inner_cone_rad, outer_cone_rad) = (spot.inner_cone_angle, spot.outer_cone_angle);
             Ok(LightKind::Spot { inner_cone_rad, outer_cone_rad })
         }
-        other => {
-            let place = format!("/extensions/KHR_lights_punctual/lights/{index}/type");
-            Err(SceneError::new(place, format!("`{other}` is no kind of light")))
-        }
+        other => Err(other.to_owned()),
     }
 }
 
-/// Local matrices of `EXT_mesh_gpu_instancing`; those that are not finite are left out.
+/// Copies of `EXT_mesh_gpu_instancing`; those that are not finite are left out. The text says what is odd about them.
 ///
 /// # Errors
-/// Accessors out of range.
+/// Accessors out of range, more copies than `limit`.
 pub(crate) fn instances(
     data: &Data<'_>,
     node: usize,
     instancing: &schema::Instancing,
-) -> Result<Vec<DMat4>, SceneError> {
+    limit: usize,
+) -> Result<(Vec<Instance>, Option<String>), SceneError> {
     let place = format!("/nodes/{node}/extensions/EXT_mesh_gpu_instancing/attributes");
-    let read = |name: &str, kind: &str| match instancing.attributes.get(name) {
-        Some(&index) => data.floats::<4>(index, &format!("{place}/{name}"), &[kind], [0.0; 4]).map(Some),
-        None => Ok(None),
+    let mut counts = Vec::new();
+    for name in ["TRANSLATION", "ROTATION", "SCALE"] {
+        if let Some(&index) = instancing.attributes.get(name) {
+            counts.push(data.count(index, &format!("{place}/{name}"))?);
+        }
+    }
+    let count = counts.iter().copied().min().unwrap_or(0);
+    if counts.iter().any(|&it| it > limit as u64) {
+        let limit = limits::INSTANCE_COUNT_MAX;
+        return Err(SceneError::new(place, format!("the instances of all nodes exceed {limit}")));
+    }
+    let uneven = counts.iter().any(|&it| it != count);
+    let remark =
+        uneven.then(|| format!("{place}: they differ in length, the first {count} instances are drawn"));
+    let read = |name: &str, kind: &str, neutral: [f32; 4]| match instancing.attributes.get(name) {
+        Some(&index) => data.floats::<4>(index, &format!("{place}/{name}"), &[kind], neutral),
+        None => Ok(vec![neutral; count as usize]),
     };
-    let (translations, rotations, scales) =
-        (read("TRANSLATION", "VEC3")?, read("ROTATION", "VEC4")?, read("SCALE", "VEC3")?);
-    let columns = [&translations, &rotations, &scales];
-    let count = columns.iter().filter_map(|column| column.as_ref().map(Vec::len)).min().unwrap_or(0);
-    let at = |column: &Option<Vec<[f32; 4]>>, index: usize, neutral| {
-        column.as_ref().map_or(neutral, |it| it[index])
-    };
-    let three = |[x, y, z, _]: [f32; 4]| DVec3::from_array([x, y, z].map(f64::from));
-    let matrices = (0..count.min(limits::DRAW_COUNT_MAX)).map(|index| {
-        let rotation = at(&rotations, index, [0.0, 0.0, 0.0, 1.0]);
-        trs(three(at(&translations, index, [0.0; 4])), rotation, three(at(&scales, index, [1.0; 4])))
+    let translations = read("TRANSLATION", "VEC3", [0.0; 4])?;
+    let rotations = read("ROTATION", "VEC4", [0.0, 0.0, 0.0, 1.0])?;
+    let scales = read("SCALE", "VEC3", [1.0; 4])?;
+    let three = |[x, y, z, _]: [f32; 4]| [x, y, z];
+    let parts = translations.into_iter().zip(rotations).zip(scales);
+    let instances = parts.map(|((translation, rotation), scale)| Instance {
+        translation: three(translation),
+        rotation: unit(rotation),
+        scale: three(scale),
     });
-    Ok(matrices.filter(|matrix| matrix.is_finite()).collect())
+    Ok((instances.filter(|instance| matrix(instance).is_finite()).collect(), remark))
+}
+
+/// Place of a copy in full precision.
+pub(crate) fn matrix(instance: &Instance) -> DMat4 {
+    let wide = |values: [f32; 3]| DVec3::from_array(values.map(f64::from));
+    trs(wide(instance.translation), instance.rotation, wide(instance.scale))
+}
+
+/// At unit length; untouched where it has it, so that what was made stays as it is.
+fn unit(rotation: [f32; 4]) -> [f32; 4] {
+    const SQUARED_LENGTH_TOLERANCE: f64 = 1e-6;
+    let squared: f64 = rotation.iter().map(|&value| f64::from(value) * f64::from(value)).sum();
+    if (squared - 1.0).abs() <= SQUARED_LENGTH_TOLERANCE {
+        rotation
+    } else if squared > 0.0 && squared.is_finite() {
+        rotation.map(|value| (f64::from(value) / squared.sqrt()) as f32)
+    } else {
+        [0.0, 0.0, 0.0, 1.0]
+    }
 }

@@ -3,9 +3,11 @@
 use std::collections::BTreeSet;
 
 use bytemuck::{Pod, Zeroable};
-use glam::{Mat4, Vec3};
+use glam::{Mat4, Quat, Vec3};
 
 use crate::Animation;
+use crate::deform::{Influence, MorphTarget};
+use crate::play::Sources;
 
 /// Everything a renderer needs to draw one scene.
 #[derive(Clone, Debug, Default)]
@@ -24,22 +26,29 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// Punctual lights of the file that ever shine.
     pub lights: Vec<Light>,
-    /// What animations move, parents first; empty where nothing moves.
+    /// What animations move and what skins hang on, parents first; empty where nothing moves.
     pub nodes: Vec<Node>,
-    /// What hangs on those nodes. A draw, camera or light that is not here never moves.
+    /// What hangs on those nodes. A draw, camera or light that is not here never moves. A skinned draw is here only
+    /// if its node may come and go: the node decides whether it is seen, its joints where.
     pub carried: Vec<Carried>,
+    /// Joints that some animation moves; those that none does are part of the vertices.
+    pub skins: Vec<Skin>,
+    /// Weights of morphing draws at rest, one entry for each such draw: as many as the primitive has targets.
+    pub morphs: Vec<Vec<f32>>,
     /// What the rest pose does not show but an animation may: of invisible nodes and of nodes shrunk to a point or line.
     pub hidden: Vec<Draw>,
-    /// What moves, and how; the draws above stand at the rest pose.
+    /// What moves, and how; the draws above stand at the rest pose, [`Scene::pose`] plays.
     pub animations: Vec<Animation>,
     /// Names of `KHR_materials_variants`; [`Primitive::material`] is the default, of none of them.
     pub variants: Vec<String>,
     /// Materials of primitives in variants.
     pub variant_materials: Vec<VariantMaterial>,
-    /// World bounds of all draws; `None` for an empty scene.
+    /// World bounds of all draws at rest, skinned and morphed; `None` for an empty scene.
     pub bounds: Option<Bounds>,
     /// What the file asks for and this version draws approximately or not at all, a line each.
     pub notes: Vec<String>,
+    /// What [`Scene::pose`] needs of the file besides.
+    pub sources: Sources,
 }
 
 /// An axis-aligned box.
@@ -78,8 +87,12 @@ pub struct Primitive {
     pub indices: Vec<u32>,
     /// Index into [`Scene::materials`].
     pub material: usize,
-    /// Object-space bounds.
+    /// Object-space bounds, neither skinned nor morphed.
     pub bounds: Bounds,
+    /// The joints that each vertex hangs on; empty without a skin.
+    pub influences: Vec<Influence>,
+    /// What morph weights add to the vertices, which are unmorphed then; empty without any.
+    pub targets: Vec<MorphTarget>,
 }
 
 /// A primitive placed in the world.
@@ -87,13 +100,70 @@ pub struct Primitive {
 pub struct Draw {
     /// Index into [`Scene::primitives`].
     pub primitive: usize,
-    /// Object to world.
+    /// Object to world; the identity with a skin. Its determinant, or that of each product with an instance, is positive.
     pub world: Mat4,
     /// The node's name, for messages.
     pub name: String,
+    /// Index into [`Scene::skins`]: the vertices go from skin space to the world by their joints alone.
+    pub skin: Option<usize>,
+    /// Index into [`Scene::morphs`], of this draw alone.
+    pub morph: Option<usize>,
+    /// Copies, each placed by `world · instance`; empty for one at `world`.
+    pub instances: Vec<Instance>,
 }
 
-/// A node that moves, or that another one which moves hangs on.
+/// Place of a copy: scaled, then rotated, then moved, then by [`Draw::world`].
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Instance {
+    /// Object units.
+    pub translation: [f32; 3],
+    /// Quaternion x, y, z, w, unit length.
+    pub rotation: [f32; 4],
+    /// Factors; a mirrored copy has negative ones.
+    pub scale: [f32; 3],
+}
+
+impl Instance {
+    /// The copy's place relative to the draw.
+    pub fn matrix(&self) -> Mat4 {
+        let translation = self.translation.into();
+        Mat4::from_scale_rotation_translation(self.scale.into(), Quat::from_array(self.rotation), translation)
+    }
+}
+
+/// Joints that vertices hang on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Skin {
+    /// Indices into [`Scene::nodes`]; [`Influence::joints`] index this list.
+    pub joints: Vec<usize>,
+    /// Skin space to joint, for each joint.
+    pub inverse_binds: Vec<Mat4>,
+}
+
+impl Scene {
+    /// What a draw calls for with a material, its primitive's own or one of a variant: what the material does, and what
+    /// the geometry does.
+    pub fn effects(&self, draw: &Draw, material: usize) -> EffectSet {
+        let mut effects = self.materials[material].effects.clone();
+        effects.extend(draw.effects());
+        effects
+    }
+}
+
+impl Draw {
+    /// What its geometry calls for, whatever the material.
+    pub fn effects(&self) -> EffectSet {
+        let called_for = [
+            (self.skin.is_some(), Effect::Skin),
+            (self.morph.is_some(), Effect::Morph),
+            (!self.instances.is_empty(), Effect::Instancing),
+        ];
+        called_for.into_iter().filter(|(is_called, _)| *is_called).map(|(_, effect)| effect).collect()
+    }
+}
+
+/// A node that moves, a joint, or what one of those hangs on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {
     /// Its name.
@@ -122,7 +192,7 @@ pub enum Transform {
     Matrix(Mat4),
 }
 
-/// Something that moves with a node: its world matrix is the node's times `local`.
+/// Something that moves with a node: its world matrix is the node's times `local`, but for skinned draws.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Carried {
     /// Index into [`Scene::nodes`].
@@ -157,7 +227,8 @@ pub struct VariantMaterial {
     pub variants: Vec<usize>,
 }
 
-/// One shading phenomenon a material calls for. [`Effect::name`] is the feature the shader is compiled with.
+/// One phenomenon that a material, or a draw's geometry, calls for. [`Effect::name`] is the feature the shader is
+/// compiled with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Effect {
     /// Alpha below the cutoff is discarded.
@@ -174,8 +245,12 @@ pub enum Effect {
     Dispersion,
     /// Light of its own.
     Emission,
+    /// Copies of the geometry, each placed on its own: [`Draw::instances`].
+    Instancing,
     /// A thin film whose colour depends on the view.
     Iridescence,
+    /// Morph targets whose weights an animation changes.
+    Morph,
     /// Tangent-space normal texture that is not flat.
     NormalMap,
     /// Occlusion texture.
@@ -184,6 +259,8 @@ pub enum Effect {
     PunctualLights,
     /// Cloth-like retroreflection at grazing angles.
     Sheen,
+    /// Joints that an animation moves.
+    Skin,
     /// `KHR_materials_specular`/`ior` away from their defaults.
     Specular,
     /// Light passes through the surface.
@@ -196,7 +273,7 @@ pub enum Effect {
     Volume,
 }
 
-/// Effects of a material, sorted: the shader variant it is drawn with.
+/// Effects of a material or a draw, sorted: the shader variant it is drawn with.
 pub type EffectSet = BTreeSet<Effect>;
 
 /// Whether a surface hides what lies behind it.

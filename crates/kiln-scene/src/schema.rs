@@ -144,7 +144,7 @@ pub(crate) struct NodeExtensions {
     pub light: Option<LightIndex>,
     #[serde(rename = "KHR_node_visibility", default, skip_serializing_if = "Option::is_none")]
     pub visibility: Option<Visibility>,
-    #[serde(rename = "EXT_mesh_gpu_instancing", default, skip_serializing)]
+    #[serde(rename = "EXT_mesh_gpu_instancing", default, skip_serializing_if = "Option::is_none")]
     pub instancing: Option<Instancing>,
 }
 
@@ -189,7 +189,7 @@ pub(crate) struct Primitive {
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct Skin {
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inverse_bind_matrices: Option<usize>,
     pub joints: Vec<usize>,
 }

@@ -29,9 +29,6 @@ pub(crate) struct ChannelTarget {
     pub path: String,
     #[serde(default, skip_serializing_if = "is_default")]
     pub extensions: TargetExtensions,
-    /// What a pack says in a way that other readers pass over; free form in other files.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub extras: Option<serde_json::Value>,
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]

@@ -3,11 +3,13 @@
 //! Every step leaves a result of its own as it is, bit for bit, so that a pack of a pack is the same pack.
 
 use std::collections::HashMap;
+use std::hash::Hash;
 
 use glam::DVec3;
 
+use crate::deform::{Influence, MorphDelta, MorphTarget};
 use crate::geometry::Needs;
-use crate::{Bounds, Vertex, tangents};
+use crate::{Bounds, Primitive, Vertex, tangents};
 
 /// A triangle list.
 #[derive(Clone, Debug, Default)]
@@ -16,8 +18,18 @@ pub(crate) struct Geometry {
     pub indices: Vec<u32>,
     pub has_normals: bool,
     pub has_tangents: bool,
+    /// One a vertex, or none.
+    pub influences: Vec<Influence>,
+    /// By the file's number of the target.
+    pub targets: Vec<(usize, MorphTarget)>,
     /// Vertices whose joint weights are negative or do not sum up to 1.
     pub odd_weight_count: usize,
+    /// Vertices that lost weights, because they hang on more than four joints.
+    pub dropped_joint_count: usize,
+    /// What morph targets add, but is no number.
+    pub odd_delta_count: usize,
+    /// Which vertex that was read each one is, if it has influences or targets: those wait until all is settled.
+    pub sources: Option<Vec<u32>>,
 }
 
 /// How far from 1 the squared length of a unit vector may be; four times what rounding to f32 leaves.
@@ -41,6 +53,14 @@ pub(crate) fn finish(mut geometry: Geometry, needs: Needs) -> (Geometry, Vec<Str
         "vertices have joint weights that are negative or whose sum is not 1",
     );
     remark(
+        geometry.dropped_joint_count,
+        "/attributes/JOINTS_0",
+        "vertices hang on more than four joints, of which the four heaviest count",
+    );
+    remark(geometry.odd_delta_count, "/targets", "vertices of morph targets are not finite and count as 0");
+    let deforms = !(geometry.influences.is_empty() && geometry.targets.is_empty());
+    geometry.sources = deforms.then(|| (0..geometry.vertices.len() as u32).collect());
+    remark(
         drop_non_finite_triangles(&mut geometry),
         "/attributes/POSITION",
         "triangles with non-finite positions were dropped",
@@ -53,6 +73,9 @@ pub(crate) fn finish(mut geometry: Geometry, needs: Needs) -> (Geometry, Vec<Str
     if needs.normals && !geometry.has_normals {
         unshare(&mut geometry);
         flat_normals(&mut geometry);
+        let what =
+            "morph targets do not move the normals, which are missing: the unmorphed shape's flat ones stay";
+        remark(geometry.targets.len(), "/attributes", what);
         split = true;
     } else if needs.normals {
         let normal = "/attributes/NORMAL";
@@ -90,7 +113,31 @@ pub(crate) fn finish(mut geometry: Geometry, needs: Needs) -> (Geometry, Vec<Str
         weld(&mut geometry);
     }
     compact(&mut geometry);
+    settle(&mut geometry);
     (geometry, remarks)
+}
+
+/// Gives each vertex the influence and the morph deltas of the one that it was; targets without any go.
+fn settle(geometry: &mut Geometry) {
+    let Some(sources) = geometry.sources.take() else { return };
+    if !geometry.influences.is_empty() {
+        geometry.influences = sources.iter().map(|&at| geometry.influences[at as usize]).collect();
+    }
+    for (_, target) in &mut geometry.targets {
+        target.deltas = sources.iter().map(|&at| target.deltas[at as usize]).collect();
+    }
+    let is_zero = |delta: &MorphDelta| *delta == MorphDelta::default();
+    geometry.targets.retain(|(_, target)| !target.deltas.iter().all(is_zero));
+}
+
+/// Shrinks what morph targets add to a vector as much as the vector was.
+fn scale_deltas(geometry: &mut Geometry, at: usize, length: f64, part: fn(&mut MorphDelta) -> &mut [f32; 3]) {
+    let Some(sources) = &geometry.sources else { return };
+    let source = sources[at] as usize;
+    for (_, target) in &mut geometry.targets {
+        let delta = part(&mut target.deltas[source]);
+        *delta = delta.map(|value| (f64::from(value) / length) as f32);
+    }
 }
 
 /// Drops coordinates that were read for the tangents alone.
@@ -108,8 +155,14 @@ fn forget_uvs(geometry: &mut Geometry, needed: [bool; 2]) {
 /// The mirror image about x = 0: `world · diag(−1, 1, 1)` with it shows what `world` with `geometry` does.
 /// The bitangent is a cross product, which mirrors to its opposite: the handedness makes up for it.
 /// Tangents that nothing reads keep their neutral value.
-pub(crate) fn mirrored(vertices: &[Vertex], indices: &[u32], has_tangents: bool) -> (Vec<Vertex>, Vec<u32>) {
-    let mut vertices = vertices.to_vec();
+/// Nothing that has joints is mirrored: they place it.
+pub(crate) fn mirrored(source: &Primitive, has_tangents: bool) -> Primitive {
+    let Primitive { mut vertices, indices, mut targets, .. } = source.clone();
+    for delta in targets.iter_mut().flat_map(|target| &mut target.deltas) {
+        for part in [&mut delta.position, &mut delta.normal, &mut delta.tangent] {
+            part[0] = -part[0];
+        }
+    }
     for vertex in &mut vertices {
         vertex.position[0] = -vertex.position[0];
         vertex.normal[0] = -vertex.normal[0];
@@ -119,7 +172,9 @@ pub(crate) fn mirrored(vertices: &[Vertex], indices: &[u32], has_tangents: bool)
         }
     }
     let (triangles, _) = indices.as_chunks::<3>();
-    (vertices, triangles.iter().flat_map(|&[a, b, c]| [a, c, b]).collect())
+    let indices = triangles.iter().flat_map(|&[a, b, c]| [a, c, b]).collect();
+    let bounds = bounds(&vertices);
+    Primitive { vertices, indices, bounds, targets, material: source.material, influences: Vec::new() }
 }
 
 /// Smallest box around all vertices, of which there is at least one.
@@ -189,6 +244,9 @@ fn repair_attributes(geometry: &mut Geometry) -> (usize, usize) {
 
 /// Gives every corner a vertex of its own.
 fn unshare(geometry: &mut Geometry) {
+    if let Some(sources) = &mut geometry.sources {
+        *sources = geometry.indices.iter().map(|&index| sources[index as usize]).collect();
+    }
     geometry.vertices = geometry.indices.iter().map(|&index| geometry.vertices[index as usize]).collect();
     geometry.indices = (0..geometry.vertices.len() as u32).collect();
 }
@@ -227,9 +285,14 @@ fn repair_normals(geometry: &mut Geometry) -> usize {
             triangle.iter().for_each(|&index| sums[index as usize] += area);
         }
     }
-    for (at, vertex) in geometry.vertices.iter_mut().enumerate() {
+    for at in 0..geometry.vertices.len() {
+        let normal = geometry.vertices[at].normal;
+        let scaled = unit(normal);
+        if scaled.is_some_and(|scaled| scaled != normal) {
+            scale_deltas(geometry, at, wide(normal).length(), |delta| &mut delta.normal);
+        }
         let from_triangles = || unit_or_up(sums.get(at).copied().unwrap_or(DVec3::ZERO));
-        vertex.normal = unit(vertex.normal).unwrap_or_else(from_triangles);
+        geometry.vertices[at].normal = scaled.unwrap_or_else(from_triangles);
     }
     broken
 }
@@ -237,32 +300,52 @@ fn repair_normals(geometry: &mut Geometry) -> usize {
 /// A tangent must be finite, have a direction that is not the normal's, and a handedness of ±1.
 fn repair_tangents(geometry: &mut Geometry) -> usize {
     let mut repaired = 0;
-    for vertex in &mut geometry.vertices {
+    for at in 0..geometry.vertices.len() {
+        let vertex = &geometry.vertices[at];
         let [x, y, z, w] = vertex.tangent;
         let handedness = if w < 0.0 { -1.0 } else { 1.0 };
-        let usable = unit([x, y, z]).filter(|&tangent| wide(tangent).dot(wide(vertex.normal)).abs() < 0.9999);
+        let given = [x, y, z];
+        let usable = unit(given).filter(|&tangent| wide(tangent).dot(wide(vertex.normal)).abs() < 0.9999);
         let [x, y, z] = usable.unwrap_or_else(|| {
             repaired += 1;
             narrow(wide(vertex.normal).any_orthonormal_vector())
         });
-        vertex.tangent = [x, y, z, handedness];
+        geometry.vertices[at].tangent = [x, y, z, handedness];
+        if usable.is_some_and(|usable| usable != given) {
+            scale_deltas(geometry, at, wide(given).length(), |delta| &mut delta.tangent);
+        }
     }
     repaired
 }
 
-/// Shares vertices that are equal in every bit, in the order of their first use.
+/// Shares vertices that are equal in every bit, in the order of their first use. Those with influences or morph targets
+/// must have been one to be one again.
 fn weld(geometry: &mut Geometry) {
-    let mut seen: HashMap<[u32; size_of::<Vertex>() / 4], u32> =
-        HashMap::with_capacity(geometry.vertices.len());
-    let mut vertices = Vec::new();
+    type Bits = [u32; size_of::<Vertex>() / 4];
+    match geometry.sources.take() {
+        None => drop(weld_by(geometry, |vertex, _| bytemuck::cast::<Vertex, Bits>(vertex))),
+        Some(sources) => {
+            let key = |vertex, at| (bytemuck::cast::<Vertex, Bits>(vertex), sources[at]);
+            let firsts = weld_by(geometry, key);
+            geometry.sources = Some(firsts.into_iter().map(|at| sources[at as usize]).collect());
+        }
+    }
+}
+
+/// Makes vertices of equal keys one; returns which one each is now.
+fn weld_by<K: Eq + Hash>(geometry: &mut Geometry, key: impl Fn(Vertex, usize) -> K) -> Vec<u32> {
+    let mut seen: HashMap<K, u32> = HashMap::with_capacity(geometry.vertices.len());
+    let (mut vertices, mut firsts) = (Vec::new(), Vec::new());
     for index in &mut geometry.indices {
         let vertex = geometry.vertices[*index as usize];
-        *index = *seen.entry(bytemuck::cast(vertex)).or_insert_with(|| {
+        *index = *seen.entry(key(vertex, *index as usize)).or_insert_with(|| {
             vertices.push(vertex);
+            firsts.push(*index);
             vertices.len() as u32 - 1
         });
     }
     geometry.vertices = vertices;
+    firsts
 }
 
 fn used_vertices(geometry: &Geometry) -> Vec<bool> {
@@ -288,4 +371,8 @@ fn compact(geometry: &mut Geometry) {
     geometry.indices.iter_mut().for_each(|index| *index = renumbered[*index as usize]);
     let mut flags = used.iter();
     geometry.vertices.retain(|_| flags.next() == Some(&true));
+    if let Some(sources) = &mut geometry.sources {
+        let mut flags = used.iter();
+        sources.retain(|_| flags.next() == Some(&true));
+    }
 }

@@ -1,19 +1,15 @@
-//! The moving part of a pack: nodes with what they carry, animations, variants.
-//!
-//! Other readers can play it, but for morph weights: the geometry is morphed to the rest pose, so a channel of
-//! weights would name targets that are not there.
+//! The moving part of a pack: nodes with what they carry, animations, variants. Other readers can play it.
 
 use std::collections::{BTreeMap, BTreeSet};
-
-use glam::Mat4;
-use serde_json::json;
 
 use crate::schema::{
     self, Accessor, AnimationChannel, AnimationSampler, ChannelTarget, Pointer, TargetExtensions,
     VariantMapping, VariantMappings, Visibility,
 };
-use crate::write::{FLOAT, Writer, node};
+use crate::write::{FLOAT, Placed, Writer, node};
+use crate::write_geometry::whole;
 use crate::{Animation, Curve, Interpolation, Item, Scene, Target, Transform};
+use glam::Mat4;
 
 const UNSIGNED_BYTE: u32 = 5121;
 
@@ -35,9 +31,15 @@ fn stored(target: Target) -> Stored {
 }
 
 impl Writer {
-    /// Writes the nodes that move and, through `make`, what they carry; returns the number of the first one. What a
-    /// node carries hangs before its other children, which is the order in which a reader numbers things.
-    pub fn hierarchy(&mut self, scene: &Scene, make: &dyn Fn(Item, Mat4) -> schema::Node) -> usize {
+    /// Writes the nodes that move and, through `make`, what they carry; returns the number of the first one, and puts
+    /// those of what is carried into `items`. What a node carries hangs before its other children, which is the order in
+    /// which a reader numbers things.
+    pub fn hierarchy(
+        &mut self,
+        scene: &Scene,
+        make: &dyn Fn(Item, Mat4) -> schema::Node,
+        items: &mut BTreeMap<Item, usize>,
+    ) -> usize {
         let channels = scene.animations.iter().flat_map(|animation| &animation.channels);
         let blinking: BTreeSet<usize> = channels
             .filter_map(
@@ -61,6 +63,7 @@ impl Writer {
         }
         for carried in &scene.carried {
             let child = self.root.nodes.len();
+            items.insert(carried.item, child);
             self.root.nodes.push(make(carried.item, carried.local));
             self.root.nodes[first + carried.node].children.push(child);
         }
@@ -72,8 +75,8 @@ impl Writer {
         first
     }
 
-    /// Writes the animations of a scene whose nodes begin at `first_node`.
-    pub fn animations(&mut self, animations: &[Animation], first_node: usize) {
+    /// Writes the animations of a scene whose nodes are there.
+    pub fn animations(&mut self, animations: &[Animation], placed: &Placed) {
         // Curves of a bake mostly have the same times.
         let mut times = BTreeMap::new();
         for animation in animations {
@@ -84,7 +87,7 @@ impl Writer {
             let samplers = samplers.map(|(at, curve)| self.sampler(curve, stored[&at], &mut times)).collect();
             let channels = animation.channels.iter().map(|channel| AnimationChannel {
                 sampler: channel.curve,
-                target: channel_target(channel.target, first_node),
+                target: channel_target(channel.target, placed),
             });
             let name = (!animation.name.is_empty()).then(|| animation.name.clone());
             let animation = schema::Animation { name, channels: channels.collect(), samplers };
@@ -135,17 +138,8 @@ impl Writer {
     ) -> usize {
         let view = self.view(bytes, None, None);
         let kind = if width == 1 { "SCALAR".to_owned() } else { format!("VEC{width}") };
-        self.accessor(Accessor {
-            buffer_view: Some(view),
-            byte_offset: 0,
-            component_type,
-            normalized: false,
-            count: count as u64,
-            kind,
-            min: ends.map(|(min, _)| vec![min]),
-            max: ends.map(|(_, max)| vec![max]),
-            sparse: None,
-        })
+        let (min, max) = (ends.map(|(min, _)| vec![min]), ends.map(|(_, max)| vec![max]));
+        self.accessor(Accessor { min, max, ..whole(view, component_type, count, &kind) })
     }
 
     /// Writes the variants; the meshes, one a primitive, must be there.
@@ -164,9 +158,10 @@ impl Writer {
     }
 }
 
-fn channel_target(target: Target, first_node: usize) -> ChannelTarget {
+fn channel_target(target: Target, placed: &Placed) -> ChannelTarget {
+    let first_node = placed.first;
     let of_node = |node: usize, path: &str| ChannelTarget {
-        node: Some(first_node + node),
+        node: Some(node),
         path: path.into(),
         ..ChannelTarget::default()
     };
@@ -176,14 +171,10 @@ fn channel_target(target: Target, first_node: usize) -> ChannelTarget {
         ..ChannelTarget::default()
     };
     match target {
-        Target::Translation { node } => of_node(node, "translation"),
-        Target::Rotation { node } => of_node(node, "rotation"),
-        Target::Scale { node } => of_node(node, "scale"),
-        Target::Weights { node } => ChannelTarget {
-            node: None,
-            extras: Some(json!({ "node": first_node + node })),
-            ..of_node(node, "weights")
-        },
+        Target::Translation { node } => of_node(first_node + node, "translation"),
+        Target::Rotation { node } => of_node(first_node + node, "rotation"),
+        Target::Scale { node } => of_node(first_node + node, "scale"),
+        Target::Weights { morph } => of_node(placed.morphs[morph], "weights"),
         Target::Visibility { node } => {
             pointer(format!("/nodes/{}/extensions/KHR_node_visibility/visible", first_node + node))
         }

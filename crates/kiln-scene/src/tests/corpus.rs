@@ -16,7 +16,7 @@ pub(super) fn corpus() -> Option<PathBuf> {
 }
 
 #[expect(clippy::print_stderr, reason = "what the corpus runs found is for people to read")]
-fn report(line: &str) {
+pub(super) fn report(line: &str) {
     eprintln!("{line}");
 }
 
@@ -59,11 +59,37 @@ fn check_file(expected: &Expected) {
 /// What a renderer relies on.
 #[track_caller]
 fn check_scene(scene: &Scene) {
+    for draw in scene.draws.iter().chain(&scene.hidden) {
+        let primitive = &scene.primitives[draw.primitive];
+        let joints = draw.skin.map_or(0, |skin| scene.skins[skin].joints.len());
+        assert_eq!(draw.skin.is_some(), !primitive.influences.is_empty(), "{}", draw.name);
+        let hung = primitive.influences.iter().flat_map(|it| it.joints);
+        assert!(hung.into_iter().all(|joint| usize::from(joint) < joints), "{}", draw.name);
+        assert_eq!(draw.morph.map_or(0, |morph| scene.morphs[morph].len()), primitive.targets.len());
+    }
     for draw in &scene.draws {
-        assert!(draw.primitive < scene.primitives.len());
-        assert!(draw.world.determinant() > 0.0, "{}", draw.name);
+        let places: Vec<_> = draw.instances.iter().map(|it| draw.world * it.matrix()).collect();
+        let is_solid = |place: &glam::Mat4| place.determinant() > 0.0;
+        assert!(
+            if places.is_empty() { is_solid(&draw.world) } else { places.iter().all(is_solid) },
+            "{}",
+            draw.name
+        );
+    }
+    for skin in &scene.skins {
+        assert!(skin.joints.len() == skin.inverse_binds.len());
+        assert!(skin.joints.iter().all(|&joint| joint < scene.nodes.len()));
     }
     for primitive in &scene.primitives {
+        let counts = primitive
+            .targets
+            .iter()
+            .map(|it| it.deltas.len())
+            .chain(Some(primitive.influences.len()).filter(|&count| count > 0));
+        assert!(counts.into_iter().all(|count| count == primitive.vertices.len()));
+        for influence in &primitive.influences {
+            super::check_within("weights", &[influence.weights.iter().sum()], &[1.0], 2e-6);
+        }
         assert!(primitive.material < scene.materials.len());
         assert!(!primitive.indices.is_empty() && primitive.indices.len() % 3 == 0);
         assert!(primitive.indices.iter().all(|&index| (index as usize) < primitive.vertices.len()));
@@ -81,7 +107,7 @@ fn check_scene(scene: &Scene) {
     }
 }
 
-fn files_below(folder: &Path, corpus: &Path, list: &mut Vec<String>) {
+pub(super) fn files_below(folder: &Path, corpus: &Path, list: &mut Vec<String>) {
     let mut entries: Vec<PathBuf> =
         std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     entries.sort();
@@ -245,8 +271,19 @@ fn fox_skinned_at_rest_is_where_it_was_modelled() {
         file: "Fox/glTF/Fox.gltf",
         triangles: 576,
         draws: 1,
-        variants: &["base"],
+        variants: &["skin"],
         bounds: [[-12.592_718, -0.121_745, -88.095], [12.592_718, 78.907_19, 66.624_86]],
+    });
+}
+
+#[test]
+fn simple_instancing_is_one_draw() {
+    check_file(&Expected {
+        file: "SimpleInstancing/glTF/SimpleInstancing.gltf",
+        triangles: 1500,
+        draws: 1,
+        variants: &["instancing"],
+        bounds: [[-1.666_667; 3], [12.731_707; 3]],
     });
 }
 

@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// Adds an animation of one channel; `values` are elements of type `kind`.
-fn animate(file: &mut File, target: Value, mode: &str, times: &[f32], values: &[f32], kind: &str) {
+pub(super) fn animate(file: &mut File, target: Value, mode: &str, times: &[f32], values: &[f32], kind: &str) {
     let scalars = |file: &mut File, values: &[f32], kind: &str| {
         let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
         let width = kind.strip_prefix("VEC").map_or(1, |width| width.parse().unwrap());
@@ -24,7 +24,7 @@ fn animate(file: &mut File, target: Value, mode: &str, times: &[f32], values: &[
     }));
 }
 
-fn pointer(to: &str) -> Value {
+pub(super) fn pointer(to: &str) -> Value {
     json!({"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": to}}})
 }
 
@@ -39,7 +39,7 @@ fn with_moving(material: Value, path: &str, values: &[f32], kind: &str) -> File 
 
 /// Checks a pack and its pack, and returns the variant of its first material.
 #[track_caller]
-fn variant(file: File) -> String {
+pub(super) fn variant(file: File) -> String {
     let packed = pack_alone(&file.bytes());
     let glb = packed.glb.unwrap_or_else(|| panic!("{:?}", packed.diagnostics));
     let again = pack("again.glb", &glb, &mut |_| None);
@@ -269,11 +269,13 @@ fn cameras_lights_transforms_and_weights_are_targets_too() {
             Target::Camera { camera: 0, property: CameraProperty::Yfov },
             Target::Light { light: 0, property: LightProperty::Color },
             Target::Material { material: 0, property: offset },
-            Target::Weights { node: 3 },
+            Target::Weights { morph: 0 },
         ]
     );
     let curve = &scene.animations[4].curves[0];
     assert_eq!((curve.interpolation, curve.width, &curve.values), (Interpolation::CubicSpline, 2, &weights));
+    let mirror = scene.draws.iter().find(|draw| draw.morph == Some(0)).unwrap();
+    assert_eq!((mirror.name.as_str(), &scene.morphs), ("mirror", &vec![vec![0.0, 0.0]]));
     variant(file);
 }
 
