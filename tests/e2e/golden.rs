@@ -44,6 +44,26 @@ fn sample_under_each_environment() {
     }
 }
 
+/// The first of them is the one that frames have unless somebody chooses.
+#[test]
+fn sample_through_each_tone_curve() {
+    let project = Project::sample();
+    let out = project.beside("curves");
+    let arguments = ["render", "DIR", "--size", "320x180", "--env", "sky", "--exposure", "1.5", "--json"];
+    let mut command = project.command(&arguments);
+    let output = command.args(["--vary", "tone_mapper", "--out"]).arg(&out).output().unwrap();
+    let said = text(&output.stderr);
+    if said.contains("mesa-vulkan-drivers") {
+        return skip("golden frames", "there is no graphics device");
+    }
+    assert!(output.status.success(), "{said}");
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    for curve in ["neutral", "agx", "aces", "reinhard", "none"] {
+        let actual = image::open(out.join(format!("balls-sky-{curve}.png"))).unwrap().to_rgb8();
+        check(&format!("curve-{curve}"), &actual, report["adapter"].as_str().unwrap());
+    }
+}
+
 fn check(name: &str, actual: &RgbImage, adapter: &str) {
     let path = golden_folder().join(format!("{name}.png"));
     if std::env::var_os("KILN_UPDATE_GOLDEN").is_some() {

@@ -18,6 +18,8 @@ mod harness;
 mod live;
 #[cfg(feature = "preview")]
 mod parameters;
+#[cfg(feature = "preview")]
+mod render;
 mod shader_commands;
 mod shaders;
 mod tidy;
