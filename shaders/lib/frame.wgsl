@@ -12,7 +12,6 @@ struct Frame {
     irradiance_scale: f32,
     specular_scale: f32,
     background_blur: f32,
-    @if(transmission) scene_color_level_max: f32,
 }
 
 // A light of the scene's own. KHR_lights_punctual.

@@ -49,6 +49,7 @@ fn scene_behind(point: vec3f, perceptual_roughness: f32) -> vec4f {
     if any(uv < vec2f(0.0)) || any(uv > vec2f(1.0)) {
         return vec4f(0.0);
     }
-    let level = perceptual_roughness * frame.scene_color_level_max;
+    let size = vec2f(textureDimensions(scene_color));
+    let level = perceptual_roughness * log2(max(size.x, size.y));
     return textureSampleLevel(scene_color, lut_sampler, uv, level);
 }

@@ -162,7 +162,6 @@ impl Renderer {
 
     fn frame_values(&self, shown: &Shown, view: &View) -> FrameValues {
         let prepared = &shown.prepared;
-        let scene_color_level_max = shown.scene_color.as_ref().map_or(0, SceneColor::level_max);
         let environment = &prepared.environment;
         let bounds = prepared.scene.as_ref().and_then(|scene| scene.scene.bounds);
         let camera = self.camera(view).unwrap_or(OrbitCamera::BACKGROUND_ONLY);
@@ -178,7 +177,6 @@ impl Renderer {
             irradiance_scale: environment.irradiance.scale,
             specular_scale: environment.specular.scale,
             background_blur: environment.specular.nearest_roughness(view.background_blur),
-            scene_color_level_max: scene_color_level_max as f32,
             viewport_size: self.picture.size.map(|pixels| pixels as f32),
             time_s: view.time_s,
         }

@@ -122,11 +122,6 @@ impl SceneColor {
         SceneColor { view: texture.create_view(&wgpu::TextureViewDescriptor::default()), levels, sources }
     }
 
-    /// Number of the smallest level.
-    pub fn level_max(&self) -> usize {
-        self.levels.len() - 1
-    }
-
     /// The largest level.
     pub fn base(&self) -> &wgpu::TextureView {
         &self.levels[0]

@@ -65,7 +65,6 @@ pub(crate) struct FrameValues {
     pub irradiance_scale: f32,
     pub specular_scale: f32,
     pub background_blur: f32,
-    pub scene_color_level_max: f32,
     pub viewport_size: [f32; 2],
     pub time_s: f32,
 }
@@ -85,7 +84,6 @@ impl FrameValues {
             "irradiance_scale" => self.irradiance_scale.into(),
             "specular_scale" => self.specular_scale.into(),
             "background_blur" => self.background_blur.into(),
-            "scene_color_level_max" => self.scene_color_level_max.into(),
             "viewport_size" => Value::Vec2(self.viewport_size),
             "time_s" => self.time_s.into(),
             _ => return None,

@@ -244,8 +244,7 @@ fn every_library_function_is_valid() {
 fn feature_sets_that_agree_on_named_features_compile_to_the_same() {
     let files = shipped();
     let outcome = files.compile("shaders/pbr/background.wgsl", &["sheen"]);
-    // The frame, which it shares with materials, has a member for glass.
-    assert_eq!(outcome.features, set(&["transmission"]));
+    assert_eq!(outcome.features, BTreeSet::new());
     assert_eq!(compiled(outcome), compiled(files.compile("shaders/pbr/background.wgsl", &[])));
     let material = files.compile("shaders/pbr/pbr.wgsl", &[]);
     assert_eq!(material.features, set(&FEATURES));
