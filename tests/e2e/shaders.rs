@@ -58,7 +58,11 @@ fn check_of_files_needs_no_project_and_refuses_what_is_no_shader() {
 #[test]
 fn warnings_are_errors_for_who_asks_for_that() {
     let project = Project::sample();
-    project.edit("shaders/pbr/tonemap.wgsl", "frame.exposure, vec3f(0.0)", "sqrt(frame.exposure), vec3f(0.0)");
+    project.edit(
+        "shaders/pbr/tonemap.wgsl",
+        "frame.exposure, vec3f(0.0)",
+        "sqrt(frame.exposure), vec3f(0.0)",
+    );
     let (code, report) = check(&project, &["DIR"]);
     let warning = &report["diagnostics"][0];
     assert_eq!((code, &warning["severity"]), (0, &"warning".into()), "{report:#}");

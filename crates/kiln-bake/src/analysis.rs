@@ -200,8 +200,16 @@ fn square(rgb: [f64; 3]) -> f64 {
     rgb.iter().map(|value| value * value).sum()
 }
 
+/// What convolving one texel for all texels of a chain costs, in units of L²: measured, 0.4 ms beside 0.8 µs · L².
+const TEXEL_COST: f64 = 500.0;
+
+/// The same of a Charlie chain, which has no place that its lobe does not reach, and takes logarithms: measured, 50 ms.
+const SHEEN_TEXEL_COST: f64 = 60_000.0;
+
 /// How many degrees a request needs, by the variance of what is transformed.
 pub(crate) struct Need {
+    /// What a texel that is convolved directly costs, in units of L².
+    pub(crate) texel_cost: f64,
     /// error/2 · mean.
     error: f64,
     /// The lobes' spectra, as far as the whole environment needs them.
@@ -220,7 +228,8 @@ impl Need {
         let sheen = request.sheen_alpha_min.map(|alpha| Lobe::Charlie { alpha });
         let lobes = [Lobe::Ggx { alpha: request.alpha_min }].into_iter().chain(sheen);
         let spectra = lobes.map(|lobe| spectrum_above(crate::prefilter::usable(lobe), allowed, cancel));
-        Ok(Need { error, spectra: spectra.collect::<Result<_, _>>()? })
+        let texel_cost = if request.sheen_alpha_min.is_some() { SHEEN_TEXEL_COST } else { TEXEL_COST };
+        Ok(Need { texel_cost, error, spectra: spectra.collect::<Result<_, _>>()? })
     }
 
     /// The smallest L with max_{l > L} |κ_l| √variance ≤ error/2 · mean.

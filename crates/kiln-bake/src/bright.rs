@@ -15,9 +15,6 @@ pub(crate) struct BrightTexel {
 /// Texels below this many times the mean radiance stay with the transform: nothing there can ring visibly.
 const BRIGHTNESS_MIN: f64 = 16.0;
 
-/// What convolving one texel for all texels of a chain costs, in units of L²: measured, 0.4 ms beside 0.8 µs · L².
-const TEXEL_COST: f64 = 500.0;
-
 /// The excess of the brightest texels (by their largest channel) over the brightest that stays; what is left of each has
 /// its hue ([`without`]).
 ///
@@ -46,7 +43,7 @@ pub(crate) fn take_brightest(
     };
     let cost = |&taken: &usize| {
         let degrees = need.band_limit(variance_without(taken)) as f64;
-        degrees * degrees + TEXEL_COST * taken as f64
+        degrees * degrees + need.texel_cost * taken as f64
     };
     let doubling = std::iter::successors(Some(1), |count| Some(2 * count)).take_while(|&count| count < most);
     let counts = [0, most].into_iter().chain(doubling);

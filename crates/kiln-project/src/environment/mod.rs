@@ -278,7 +278,7 @@ impl Steps<'_> {
         if let Some(alpha) = sheen {
             params["sheen_alpha_min"] = json!(alpha);
         }
-        let command = command("analyse", 2, params, &["analysis"]);
+        let command = command("analyse", 3, params, &["analysis"]);
         let step = if lobe == LobeKind::Charlie { "/sheen" } else { "" };
         let action = self.action(step, command, vec![self.light(decode)], move |inputs| {
             let cancel = cancel(inputs);
