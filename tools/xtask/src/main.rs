@@ -15,6 +15,7 @@ mod bench;
 mod bench_bake;
 mod bench_cache;
 mod bench_demand;
+mod bench_render;
 mod bench_scenes;
 mod bench_shaders;
 mod corpus;
@@ -30,6 +31,7 @@ cargo xtask bench cache           no-op bakes, planning, overhead and hashing on
 cargo xtask bench shaders         save to first diagnostic, variants a second, what an edit runs, shaders in all languages
 cargo xtask bench scenes [MB] [RUNS]
                                   time and memory of loading and packing a generated GLB (default 100 MB, 5 runs)
+cargo xtask bench render [FRAMES] milliseconds a frame of real scenes, and what each effect costs; $KILN_CORPUS
 cargo xtask bench demand          the corpus as one project: baked as its scenes need it and in full; $KILN_CORPUS
 cargo xtask bench bake […]        error and cost of prefiltered maps beside a sampled estimator; accuracy, sampled, time, scaling:
                                   one part alone; --huge: memory of a 16384×8192 panorama; panoramas from $KILN_CORPUS
@@ -50,6 +52,11 @@ fn main() -> ExitCode {
         ["bench"] => bench::run(20),
         ["bench", "cache"] => bench_cache::run(),
         ["bench", "demand"] => bench_demand::run(),
+        ["bench", "render"] => bench_render::run(8),
+        ["bench", "render", frames] => match frames.parse() {
+            Ok(frames) => bench_render::run(frames),
+            Err(_) => Err(format!("`{frames}` is no number of frames")),
+        },
         ["bench", "shaders"] => bench_shaders::run(),
         ["bench", "scenes", arguments @ ..] => bench_scenes::run(arguments),
         ["bench", "bake", arguments @ ..] => bench_bake::run(arguments),
