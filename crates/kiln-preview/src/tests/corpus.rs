@@ -17,11 +17,11 @@ const SPECULAR_LEVELS: usize = 6;
 const WANTED: &str = "nobody cancels";
 
 #[expect(clippy::print_stderr, reason = "a skipped test says so, a measured one what it measured")]
-fn say(text: &str) {
+pub(super) fn say(text: &str) {
     eprintln!("{text}");
 }
 
-fn corpus() -> Option<PathBuf> {
+pub(super) fn corpus() -> Option<PathBuf> {
     let folder = std::env::var_os("KILN_CORPUS").map(PathBuf::from);
     if folder.is_none() {
         say("SKIPPED: KILN_CORPUS is not set, no real model was drawn");
@@ -34,20 +34,25 @@ fn bake(build: &mut Build, name: &str, path: &Path) {
     let bytes = std::fs::read(path).expect("the corpus has it");
     let decoded = kiln_image::decode(&bytes, &Limits::default(), Cancel::NEVER).expect("it is sound");
     let panorama = Panorama::new(decoded.image).expect("it is twice as wide as high");
+    bake_panorama(build, name, &panorama, [SPECULAR_SIZE, SPECULAR_LEVELS]);
+}
+
+/// The same for a panorama; `size` and `levels` of the chain.
+pub(super) fn bake_panorama(build: &mut Build, name: &str, panorama: &Panorama, [size, levels]: [usize; 2]) {
     let request = AnalysisRequest {
-        alpha_min: (1.0 / (SPECULAR_LEVELS - 1) as f64).powi(2),
+        alpha_min: (1.0 / (levels - 1) as f64).powi(2),
         sheen_alpha_min: None,
         error: 1e-3,
     };
-    let analysis = kiln_bake::analyse(&panorama, &request, Cancel::NEVER).expect(WANTED);
-    let skybox = |size: usize| kiln_bake::skybox(&panorama, size, Cancel::NEVER).expect(WANTED);
-    let mirror = skybox(SPECULAR_SIZE).swap_remove(0);
+    let analysis = kiln_bake::analyse(panorama, &request, Cancel::NEVER).expect(WANTED);
+    let skybox = |size: usize| kiln_bake::skybox(panorama, size, Cancel::NEVER).expect(WANTED);
+    let mirror = skybox(size).swap_remove(0);
     let level = |level: usize| {
-        let roughness = kiln_bake::roughness_of_level(level, SPECULAR_LEVELS);
-        let (alpha, size) = (roughness * roughness, SPECULAR_SIZE >> level);
-        kiln_bake::specular_level(&analysis, alpha, size, Cancel::NEVER).expect(WANTED).cube
+        let roughness = kiln_bake::roughness_of_level(level, levels);
+        let alpha = roughness * roughness;
+        kiln_bake::specular_level(&analysis, alpha, size >> level, Cancel::NEVER).expect(WANTED).cube
     };
-    let specular: Vec<Cube> = std::iter::once(mirror).chain((1..SPECULAR_LEVELS).map(level)).collect();
+    let specular: Vec<Cube> = std::iter::once(mirror).chain((1..levels).map(level)).collect();
     add_cube(build, &format!("env/{name}/specular"), &specular);
     let irradiance = kiln_bake::irradiance(&analysis, 16, Cancel::NEVER).expect(WANTED);
     add_cube(build, &format!("env/{name}/irradiance"), &[irradiance.cube]);
@@ -78,7 +83,7 @@ fn add_model(build: &mut Build, name: &str, path: &Path) {
     build.shaders_of(&glb).scene(name, "sky", glb.to_vec());
 }
 
-fn find(corpus: &Path, name: &str) -> Option<PathBuf> {
+pub(super) fn find(corpus: &Path, name: &str) -> Option<PathBuf> {
     let mut folders = vec![corpus.to_owned()];
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {

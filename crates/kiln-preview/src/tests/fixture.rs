@@ -151,6 +151,14 @@ impl Build {
         self.target("lut/ggx", "lut", json!({ "size": LUT_SIZE, "format": "rg32f" }), &[("texels", texels)])
     }
 
+    /// The table that `kiln bake` makes.
+    pub fn exact_lut(&mut self) -> &mut Self {
+        const SIZE: usize = 64;
+        let table = kiln_bake::dfg_table(SIZE, kiln_bake::Cancel::NEVER).expect("nobody cancels");
+        let texels = table.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
+        self.target("lut/ggx", "lut", json!({ "size": SIZE, "format": "rg32f" }), &[("texels", texels)])
+    }
+
     pub fn scene(&mut self, name: &str, env: &str, glb: Vec<u8>) -> &mut Self {
         let meta = json!({ "env": env, "shader": "pbr", "notes": [] });
         self.target(&format!("scene/{name}"), "scene", meta, &[("glb", glb)])

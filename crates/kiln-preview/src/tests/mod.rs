@@ -10,4 +10,5 @@ mod panels;
 mod parameters;
 mod pure;
 mod transmission;
+mod twin;
 mod wire;
