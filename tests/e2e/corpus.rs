@@ -17,7 +17,7 @@ const SCENES: [(&str, &str); 6] = [
 ];
 
 /// The corpus, or a loud word that it is not there.
-fn corpus(test: &str) -> Option<PathBuf> {
+pub fn corpus(test: &str) -> Option<PathBuf> {
     let corpus = std::env::var_os("KILN_CORPUS").map(PathBuf::from);
     if corpus.is_none() {
         eprintln!("SKIPPED: {test}: KILN_CORPUS is not set");
@@ -26,7 +26,7 @@ fn corpus(test: &str) -> Option<PathBuf> {
 }
 
 /// A sample project that sees the corpus through a link and asks for what `toml` says.
-fn project_on(corpus: &PathBuf, toml: &str) -> Project {
+pub fn project_on(corpus: &PathBuf, toml: &str) -> Project {
     let project = Project::sample();
     std::os::unix::fs::symlink(corpus, project.path("corpus")).unwrap();
     let shaders = ["pbr", "background", "tonemap"]

@@ -2,6 +2,8 @@
 
 use serde_json::Value;
 
+#[cfg(feature = "preview")]
+use crate::corpus::{corpus, project_on};
 use crate::harness::{Project, ran, text};
 
 const CLOTH: &str =
@@ -111,4 +113,65 @@ fn frames_of_what_scenes_ask_for_and_of_everything_are_identical() {
     project.edit("kiln.toml", "# background_blur = 0.0", "max_radiance = 5.0 #");
     watch.published();
     assert!(frame(&project, "dimmer").unwrap() != needed, "the check sees no difference");
+}
+
+/// Real scenes by what they call for: cloth, coats, glass, light without lobes, copies.
+#[cfg(feature = "preview")]
+const SCENES: [(&str, &str); 5] = [
+    ("chair", "SheenChair/glTF/SheenChair.gltf"),
+    ("coats", "ClearCoatTest/glTF/ClearCoatTest.gltf"),
+    ("glass", "TransmissionTest/glTF-Binary/TransmissionTest.glb"),
+    ("unlit", "UnlitTest/glTF/UnlitTest.gltf"),
+    ("copies", "SimpleInstancing/glTF/SimpleInstancing.gltf"),
+];
+
+#[cfg(feature = "preview")]
+#[test]
+fn frames_of_real_scenes_are_those_of_full_bakes() {
+    let name = "frames_of_real_scenes_are_those_of_full_bakes";
+    let Some(corpus) = corpus(name) else { return };
+    // Each has an environment of its own, so that nothing is baked for it because of another.
+    let section = |(name, path): (&str, &str)| {
+        format!(
+            "[env.{name}]\nsource = \"environments/studio.hdr\"\nsize = 64\n\
+             [scene.{name}]\nsource = \"corpus/gltf/khronos-sample-assets/{path}\"\nenv = \"{name}\"\n"
+        )
+    };
+    let project = project_on(&corpus, &SCENES.map(section).concat());
+    let drawn = |keys: &str, folder: &str| {
+        project.write(
+            "kiln.toml",
+            project.read("kiln.toml").replace("size = 64\n", &format!("size = 64\n{keys}")),
+        );
+        let out = project.beside(folder);
+        let mut command =
+            project.command(&["render", "DIR", "--size", "160x90", "--scene", "all", "--exr", "--out"]);
+        let output = command.arg(&out).output().unwrap();
+        let said = text(&output.stderr);
+        if said.contains("mesa-vulkan-drivers") {
+            crate::harness::skip(name, "there is no graphics device");
+            return None;
+        }
+        assert!(output.status.success(), "{said}{}", text(&output.stdout));
+        // What was drawn before tone mapping and rounding.
+        let read = |(name, _): (&str, &str)| std::fs::read(out.join(format!("{name}-{name}.exr"))).unwrap();
+        Some(SCENES.map(read))
+    };
+    let levels = || {
+        project.bake().1["targets"]
+            .as_object()
+            .unwrap()
+            .values()
+            .map(|it| it["bytes"].as_u64().unwrap())
+            .sum::<u64>()
+    };
+    let Some(needed) = drawn("", "needed") else { return };
+    let few = levels();
+    let all = drawn("bake = \"all\"\nsheen = true\n", "all").unwrap();
+    assert!(levels() > few, "nothing more was baked");
+    let dimmer = drawn("max_radiance = 2.0\n", "dimmer").unwrap();
+    for (index, (scene, _)) in SCENES.iter().enumerate() {
+        assert!(all[index] == needed[index], "{scene}: the frames differ");
+        assert!(dimmer[index] != needed[index], "{scene}: the check sees no difference");
+    }
 }

@@ -344,6 +344,12 @@ fn read_effects(section: &mut Section) -> EffectOverrides {
         section.fail(message, section.place("forbid"), None);
         overrides.force.clear();
     }
+    for effect in overrides.force.iter().filter(|effect| effect.is_of_geometry()) {
+        let message =
+            format!("`{0}` cannot be forced: no setting gives a mesh what `{0}` reads", effect.name());
+        let help = "take it out of `force`; draws whose scene moves or repeats them have it already";
+        section.warn(message, section.place("force"), help);
+    }
     overrides
 }
 

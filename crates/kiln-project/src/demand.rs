@@ -135,23 +135,30 @@ fn env_demand(project: &Project, name: &str, env: &EnvConfig, scenes: &[SceneDem
                 values,
             };
             if let Some([low, high]) = material.reads.ggx.map(|interval| interval.map(f64::from)) {
-                demand.light.push(reason("lit".to_owned()));
+                push_new(&mut demand.light, reason("lit".to_owned()));
                 let widest = filtered(high);
                 let values = format!("{}, filtered up to {widest:.2}", interval_text("roughness", low, high));
                 for level in read_levels(env, [low, widest]) {
-                    demand.specular[level].push(reason(values.clone()));
+                    push_new(&mut demand.specular[level], reason(values.clone()));
                 }
             }
             if let Some([low, high]) = material.reads.charlie.map(|interval| interval.map(f64::from)) {
                 let values = interval_text("sheen roughness", low, high);
                 for level in read_levels(env, [low, high]) {
-                    demand.sheen[level].push(reason(values.clone()));
+                    push_new(&mut demand.sheen[level], reason(values.clone()));
                 }
             }
         }
     }
     [&mut demand.specular, &mut demand.sheen].into_iter().for_each(|chain| close_gaps(chain));
     demand
+}
+
+/// A material that is drawn with several kinds of geometry reads the environment once.
+fn push_new(reasons: &mut Reasons, reason: Reason) {
+    if reasons.last() != Some(&reason) {
+        reasons.push(reason);
+    }
 }
 
 /// Textures and their files have no gaps between levels.

@@ -22,7 +22,7 @@ pub use env_config::{EnvConfig, FORMATS, Range, format_name};
 pub use kiln_bake::{BAND_LIMIT_MAX, RoughnessLaw, TexelFormat, decode_level, panorama_of_cube};
 pub use kiln_export::{ExportFile, Preset};
 pub use kiln_image::{FACE_NAMES, Layout, TexelPolicy};
-pub use kiln_scene::{Effect, EffectOverrides, LightReads, MaterialEffects};
+pub use kiln_scene::{Effect, EffectOverrides, EffectSet, LightReads, MaterialEffects};
 pub use lut_config::{LutConfig, TABLES, table_name};
 pub use output::{
     MANIFEST_FILE, Manifest, ManifestFile, ManifestTarget, Written, lock_folder, manifest_of, write_outputs,

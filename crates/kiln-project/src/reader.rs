@@ -60,6 +60,12 @@ impl<'a, 'd> Section<'a, 'd> {
         self.failed = true;
     }
 
+    /// Says what does nothing as it stands; the section is used.
+    pub(crate) fn warn(&mut self, message: String, place: Range<usize>, help: &str) {
+        let warning = Diagnostic::warning(message).at(PROJECT_FILE, self.document.text, place);
+        self.document.diagnostics.push(warning.with_help(help));
+    }
+
     fn wrong_type(&mut self, key: &str, wanted: &str, value: &Spanned<DeValue>) {
         let message =
             format!("`{key}` in [{}] must be {wanted}, not {}", self.name, value.get_ref().type_str());

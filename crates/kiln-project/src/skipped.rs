@@ -2,7 +2,7 @@
 
 use kiln_build::Engine;
 
-use crate::{EnvConfig, Plan, Reasons};
+use crate::{EnvConfig, EnvDemand, Plan, Reasons};
 
 /// A map or level that nothing calls for.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,10 +47,14 @@ pub fn skipped(engine: &Engine, plan: &Plan) -> Vec<Skipped> {
         }
         let has_sheen = demand.is_sheen_read();
         for (map, chain) in [("specular", &demand.specular), ("sheen", &demand.sheen)] {
+            let read = EnvDemand::levels(chain);
+            let reader = if map == "sheen" { "cloth" } else { "material" };
             for (level, _) in chain.iter().enumerate().filter(|(_, reasons)| reasons.is_empty()) {
                 let because = match map {
                     "sheen" if !has_sheen => "no material of its scenes has sheen".to_owned(),
-                    _ => format!("none of its scenes reads roughness {:.2}", env.roughness(level)),
+                    _ if read.is_empty() => "no material of its scenes is lit".to_owned(),
+                    _ if level < read.start => format!("no {reader} of its scenes is as smooth"),
+                    _ => format!("no {reader} of its scenes is as rough"),
                 };
                 skip(format!("env/{name}/{map} mip {level}"), because, env.face_size(level));
             }

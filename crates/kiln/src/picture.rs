@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use kiln_build::{ActionId, Forecast, Input};
 use kiln_project::{PartSpec, Plan, Reason, Skipped};
 
-use crate::commands::demand;
+use crate::commands::demand::{self, Pass};
 
 /// Sizes of the SVG, in pixels.
 const ROW: usize = 26;
@@ -17,6 +17,8 @@ const MARGIN: usize = 16;
 
 struct Node {
     label: String,
+    /// What is shown of it besides under a pointer.
+    title: String,
     kind: Kind,
     /// Nodes to the left.
     reads: BTreeSet<usize>,
@@ -33,6 +35,7 @@ enum Kind {
     Target,
     Material,
     Effect,
+    Pass,
     Skipped,
 }
 
@@ -49,6 +52,7 @@ impl Kind {
             Kind::Target => ("#dfe9f7", "#46699c"),
             Kind::Material => ("#f4f1ea", "#8a8171"),
             Kind::Effect => ("#fff3d6", "#c2a00c"),
+            Kind::Pass => ("#ece4f6", "#74569c"),
             Kind::Skipped => ("#fff", "#b9b4aa"),
         }
     }
@@ -64,7 +68,8 @@ impl Kind {
             Kind::Target => "target",
             Kind::Material => "material",
             Kind::Effect => "effects",
-            Kind::Skipped => "skipped: nothing reads it",
+            Kind::Pass => "work of every frame",
+            Kind::Skipped => "skipped: nothing calls for it",
         }
     }
 }
@@ -72,6 +77,8 @@ impl Kind {
 /// A laid-out graph.
 pub(crate) struct Picture {
     nodes: Vec<Node>,
+    /// Whether columns keep the order in which their nodes were added; else few lines cross.
+    keeps_order: bool,
 }
 
 impl Picture {
@@ -82,7 +89,7 @@ impl Picture {
         wanted: &[ActionId],
         target: Option<&str>,
     ) -> Picture {
-        let mut picture = Picture { nodes: Vec::new() };
+        let mut picture = Picture { nodes: Vec::new(), keeps_order: false };
         let mut sources: BTreeMap<String, usize> = BTreeMap::new();
         let mut actions: BTreeMap<ActionId, usize> = BTreeMap::new();
         // Levels of a map are drawn as one.
@@ -125,20 +132,23 @@ impl Picture {
         picture
     }
 
-    /// Materials, the effects that they call for, and the maps, levels and variants that follow; what is left out stands
-    /// below.
+    /// Materials, the effects that they call for, and the variants, passes, maps and levels that follow; what is left out
+    /// stands below.
     pub(crate) fn of_demand(plan: &Plan, skipped: Vec<Skipped>) -> Picture {
-        let mut picture = Picture { nodes: Vec::new() };
+        let mut picture = Picture { nodes: Vec::new(), keeps_order: true };
         let mut materials: BTreeMap<(String, String), usize> = BTreeMap::new();
         let mut variants: BTreeMap<String, usize> = BTreeMap::new();
         for scene in &plan.scenes {
             for material in &scene.materials {
-                let label = format!("scene/{}: {}", scene.name, material.material);
-                let from = picture.add(label, Kind::Material);
-                materials.insert((scene.name.clone(), material.material.clone()), from);
+                // One that is drawn with several kinds of geometry has several sets of effects.
+                let from =
+                    *materials.entry((scene.name.clone(), material.material.clone())).or_insert_with(|| {
+                        picture.add(format!("scene/{}: {}", scene.name, material.material), Kind::Material)
+                    });
                 let name = material.variant_name();
                 let effects = *variants.entry(format!("{} {name}", scene.shader)).or_insert_with(|| {
-                    let effects = picture.add(name.clone(), Kind::Effect);
+                    let label = if material.effects.is_empty() { "no effect" } else { &name };
+                    let effects = picture.add(label.to_owned(), Kind::Effect);
                     let variant = picture.add(format!("shader/{}/{name}", scene.shader), Kind::Target);
                     picture.nodes[variant].reads.insert(effects);
                     effects
@@ -146,9 +156,19 @@ impl Picture {
                 picture.nodes[effects].reads.insert(from);
             }
         }
+        let (run, left_out): (Vec<Pass>, Vec<Pass>) =
+            demand::passes(plan).into_iter().partition(Pass::is_run);
+        for pass in run {
+            let node = picture.add(pass.name.to_owned(), Kind::Pass);
+            picture.nodes[node].title = pass.reason();
+            picture.nodes[node].reads =
+                pass.users.iter().filter_map(|user| materials.get(user).copied()).collect();
+        }
         for (what, reasons) in demand::merged(kiln_project::made(plan)) {
             let made = picture.add(what, Kind::Target);
-            let readers = reasons.iter().filter_map(|reason| match reason {
+            picture.nodes[made].title = reasons.iter().map(Reason::to_string).collect::<Vec<_>>().join("\n");
+            // Where a setting asks for a map whatever materials do, lines from all of them would say nothing.
+            let readers = reasons.iter().map_while(|reason| match reason {
                 Reason::Material { scene, material, .. } => {
                     materials.get(&(scene.clone(), material.clone())).copied()
                 }
@@ -158,15 +178,20 @@ impl Picture {
         }
         picture.assign_columns();
         let last = picture.nodes.iter().map(|node| node.column).max().unwrap_or(0);
-        for group in demand::groups(skipped) {
-            let skipped = picture.add(group.what, Kind::Skipped);
+        let maps = demand::groups(skipped).into_iter().map(|group| {
+            (format!("{}, saves {}", group.what, crate::report::size(group.bytes)), group.because)
+        });
+        let passes = left_out.iter().map(|pass| (pass.name.to_owned(), pass.reason()));
+        for (label, title) in passes.chain(maps) {
+            let skipped = picture.add(label, Kind::Skipped);
             picture.nodes[skipped].column = last;
+            picture.nodes[skipped].title = title;
         }
         picture
     }
 
     fn add(&mut self, label: String, kind: Kind) -> usize {
-        self.nodes.push(Node { label, kind, reads: BTreeSet::new(), column: 0 });
+        self.nodes.push(Node { label, title: String::new(), kind, reads: BTreeSet::new(), column: 0 });
         self.nodes.len() - 1
     }
 
@@ -190,7 +215,8 @@ impl Picture {
             }
         }
         let last = self.nodes.iter().map(|node| node.column).max().unwrap_or(0);
-        self.nodes.iter_mut().filter(|node| node.kind == Kind::Target).for_each(|node| node.column = last);
+        let is_result = |node: &&mut Node| matches!(node.kind, Kind::Target | Kind::Pass);
+        self.nodes.iter_mut().filter(is_result).for_each(|node| node.column = last);
     }
 
     pub(crate) fn to_dot(&self) -> String {
@@ -249,7 +275,8 @@ impl Picture {
             }
         }
         for (index, node) in self.nodes.iter().enumerate() {
-            draw_box(&mut svg, x[node.column], y[index], width(node), node.kind, &node.label);
+            let label = Label { text: &node.label, title: &node.title };
+            draw_box(&mut svg, [x[node.column], y[index], width(node)], node.kind, label);
         }
         svg + "</svg>\n"
     }
@@ -262,25 +289,29 @@ impl Picture {
             Kind::WouldRun,
             Kind::MayRun,
             Kind::Faulty,
-            Kind::Target,
             Kind::Material,
             Kind::Effect,
+            Kind::Target,
+            Kind::Pass,
             Kind::Skipped,
         ];
         let mut x = MARGIN;
         for kind in kinds.into_iter().filter(|kind| self.nodes.iter().any(|node| node.kind == *kind)) {
             let width = kind.meaning().len() * CHARACTER + 14;
-            draw_box(svg, x, MARGIN, width, kind, kind.meaning());
+            draw_box(svg, [x, MARGIN, width], kind, Label { text: kind.meaning(), title: "" });
             x += width + 8;
         }
     }
 
-    /// The nodes of each column from top to bottom: near the middle of what they read, so that few lines cross.
+    /// The nodes of each column from top to bottom: as they were added, or near the middle of what they read.
     fn rows(&self) -> Vec<Vec<usize>> {
         let count = self.nodes.iter().map(|node| node.column + 1).max().unwrap_or(0);
         let mut columns: Vec<Vec<usize>> = vec![Vec::new(); count];
         for (index, node) in self.nodes.iter().enumerate() {
             columns[node.column].push(index);
+        }
+        if self.keeps_order {
+            return columns;
         }
         let mut place = vec![0.0_f64; self.nodes.len()];
         let set_places = |column: &[usize], place: &mut Vec<f64>| {
@@ -304,9 +335,16 @@ impl Picture {
     }
 }
 
-fn draw_box(svg: &mut String, x: usize, y: usize, width: usize, kind: Kind, label: &str) {
+/// What stands in a box, and what a pointer over it shows.
+struct Label<'a> {
+    text: &'a str,
+    title: &'a str,
+}
+
+fn draw_box(svg: &mut String, [x, y, width]: [usize; 3], kind: Kind, label: Label) {
     let (fill, border) = kind.colours();
-    let label = label.replace('&', "&amp;").replace('<', "&lt;");
+    let [text, title] = [label.text, label.title].map(|text| text.replace('&', "&amp;").replace('<', "&lt;"));
+    let title = if title.is_empty() { title } else { format!("<title>{title}</title>") };
     let dash = if matches!(kind, Kind::Source { is_missing: true } | Kind::Skipped) {
         " stroke-dasharray=\"4 3\""
     } else {
@@ -314,8 +352,9 @@ fn draw_box(svg: &mut String, x: usize, y: usize, width: usize, kind: Kind, labe
     };
     let _ = writeln!(
         svg,
-        "<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{BOX}\" rx=\"4\" fill=\"{fill}\" stroke=\"{border}\"{dash}/>\
-         <text x=\"{}\" y=\"{}\">{label}</text>",
+        "<g>{title}\
+         <rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{BOX}\" rx=\"4\" fill=\"{fill}\" stroke=\"{border}\"{dash}/>\
+         <text x=\"{}\" y=\"{}\">{text}</text></g>",
         x + 7,
         y + 14
     );

@@ -92,6 +92,20 @@ fn section_with_an_error_is_left_out_and_the_others_are_used() {
 }
 
 #[test]
+fn forced_effects_of_geometry_are_warned_of_and_others_are_not() {
+    let read = |effects: &str| parse_project(&format!("version = 1\n[effects]\n{effects}\n"));
+    let (project, diagnostics) = read("force = [\"skin\", \"sheen\", \"instancing\"]");
+    assert!(project.effects.force.contains(&Effect::Sheen), "the section is used");
+    let warned: Vec<String> = diagnostics.iter().map(ToString::to_string).collect();
+    assert_eq!(warned.len(), 2, "{warned:?}");
+    assert!(
+        diagnostics.iter().all(|it| it.severity == Severity::Warning && it.span.as_ref().unwrap().line == 3)
+    );
+    assert!(warned[1].contains("no setting gives a mesh what `skin` reads"), "{warned:?}");
+    assert!(read("force = [\"sheen\"]\nforbid = [\"skin\"]").1.is_empty(), "what is there can be left out");
+}
+
+#[test]
 fn sizes_are_read_with_their_units() {
     let cases = [
         ("200000", Some(200_000)),

@@ -143,3 +143,29 @@ fn file_of_a_partial_chain_begins_at_its_first_level_and_says_so() {
         "the file does not say which levels it has"
     );
 }
+
+#[test]
+fn each_environment_is_baked_for_the_union_of_its_own_scenes() {
+    let place = place_of(&rough(0.0));
+    place.write("cloth.gltf", scene_of(SHEEN));
+    place.write("matt.gltf", scene_of(&rough(1.0)));
+    let scene = |name: &str, env: &str| {
+        format!("[scene.{name}]\nsource = \"{name}.gltf\"\nenv = \"{env}\"\nshader = \"flat\"\n")
+    };
+    let hall = "[env.hall]\nsource = \"room.hdr\"\nsize = 32\nirradiance_size = 4\n";
+    place.edit("kiln.toml", "[shader.flat]", &format!("{hall}{}[shader.flat]", scene("cloth", "hall")));
+    let apart = place.build();
+    assert_eq!(levels(&apart, "env/room/specular"), ["mip0", "mip1", "mip2"]);
+    assert_eq!(levels(&apart, "env/hall/specular"), ["mip3"]);
+    assert!(!apart.targets.contains_key("env/room/sheen"));
+    assert_eq!(levels(&apart, "env/hall/sheen"), ["mip1", "mip2"]);
+    place.edit("kiln.toml", "[shader.flat]", &format!("{}[shader.flat]", scene("matt", "room")));
+    let joined = place.build();
+    assert_eq!(levels(&joined, "env/room/specular"), ["mip0", "mip1", "mip2", "mip3"]);
+    let of_hall = |built: &Built| {
+        let targets = built.targets.iter().filter(|(name, _)| name.starts_with("env/hall/"));
+        targets.map(|(name, target)| (name.clone(), target.digest())).collect::<Vec<_>>()
+    };
+    assert_eq!(of_hall(&joined), of_hall(&apart));
+    assert!(!ran(&joined).iter().any(|action| action.contains("hall")), "{:?}", ran(&joined));
+}

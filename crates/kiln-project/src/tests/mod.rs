@@ -10,6 +10,7 @@ use crate::*;
 mod config;
 mod demand;
 mod edits;
+mod effects;
 mod outputs;
 mod outside;
 

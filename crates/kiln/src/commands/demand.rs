@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use kiln_build::Engine;
-use kiln_project::{Effect, MaterialEffects, Plan, Reasons, SceneDemand, Skipped, made, skipped};
+use kiln_project::{Effect, EffectSet, MaterialEffects, Plan, Reasons, SceneDemand, Skipped, made, skipped};
 use serde_json::{Value, json};
 
 use crate::out::say;
@@ -26,8 +26,8 @@ pub(crate) fn print(engine: &Engine, plan: &Plan) {
         let time = about_ms.map_or_else(String::new, |ms| format!(" and about {}", report::duration(ms)));
         say!("skipped  {what:<36} {because}; saves {}{time}", report::size(bytes));
     }
-    for (pass, reason, is_run) in passes(plan) {
-        say!("{}  {pass:<36} {reason}", if is_run { "needed " } else { "skipped" });
+    for pass in passes(plan) {
+        say!("{}  {:<36} {}", if pass.is_run() { "needed " } else { "skipped" }, pass.name, pass.reason());
     }
     say!("");
 }
@@ -54,7 +54,7 @@ pub(crate) fn to_json(engine: &Engine, plan: &Plan) -> Value {
         .collect();
     let passes: Vec<Value> = passes(plan)
         .into_iter()
-        .map(|(pass, reason, is_run)| json!({"pass": pass, "because": reason, "is_run": is_run}))
+        .map(|pass| json!({"pass": pass.name, "because": pass.reason(), "is_run": pass.is_run()}))
         .collect();
     json!({
         "scenes": plan.scenes.iter().map(scene).collect::<Vec<_>>(),
@@ -122,8 +122,8 @@ fn extend_levels(last: &mut String, what: &str) {
 /// Skipped levels that are skipped for one reason.
 pub(crate) struct Group {
     pub(crate) what: String,
-    because: String,
-    bytes: u64,
+    pub(crate) because: String,
+    pub(crate) bytes: u64,
     about_ms: Option<f64>,
 }
 
@@ -151,42 +151,55 @@ fn reasons_text(reasons: &Reasons) -> String {
     }
 }
 
-/// What the preview does in a frame only where a material calls for it: pass, reason, whether it runs.
-fn passes(plan: &Plan) -> Vec<(&'static str, String, bool)> {
-    let with = |wanted: &dyn Fn(&MaterialEffects) -> bool| {
-        let scenes = plan.scenes.iter();
-        let all = scenes.flat_map(|scene| scene.materials.iter().map(move |material| (scene, material)));
-        let found = all
-            .filter(|(_, material)| wanted(material))
-            .map(|(scene, material)| format!("scene/{}: {}", scene.name, material.material));
-        found.collect::<Vec<_>>()
-    };
-    let pass = |name: &'static str, wanted: &dyn Fn(&MaterialEffects) -> bool, nothing: &str| {
-        let found = with(wanted);
-        match found.as_slice() {
-            [] => (name, nothing.to_owned(), false),
-            [only] => (name, only.clone(), true),
-            [first, rest @ ..] => (name, format!("{first}, and {} more", rest.len()), true),
+/// Something that the preview does in a frame only where a material calls for it.
+pub(crate) struct Pass {
+    pub(crate) name: &'static str,
+    /// Scenes and materials that call for it.
+    pub(crate) users: Vec<(String, String)>,
+    /// What is so if nothing does.
+    nothing: &'static str,
+}
+
+impl Pass {
+    pub(crate) fn is_run(&self) -> bool {
+        !self.users.is_empty()
+    }
+
+    /// The first that calls for it and how many more do, or why it is left out.
+    pub(crate) fn reason(&self) -> String {
+        let named = |(scene, material): &(String, String)| format!("scene/{scene}: {material}");
+        match self.users.as_slice() {
+            [] => self.nothing.to_owned(),
+            [only] => named(only),
+            [first, rest @ ..] => format!("{}, and {} more", named(first), rest.len()),
         }
+    }
+}
+
+pub(crate) fn passes(plan: &Plan) -> Vec<Pass> {
+    let pass = |name: &'static str, nothing: &'static str, wanted: &dyn Fn(&EffectSet) -> bool| {
+        let materials = |scene: &SceneDemand| {
+            let wanting = scene.materials.iter().filter(|material| wanted(&material.effects));
+            wanting.map(|material| (scene.name.clone(), material.material.clone())).collect::<Vec<_>>()
+        };
+        let mut users: Vec<(String, String)> = plan.scenes.iter().flat_map(materials).collect();
+        // A material is listed once for each kind of geometry that has it.
+        users.dedup();
+        Pass { name, users, nothing }
     };
-    let has = |effect: Effect| move |material: &MaterialEffects| material.effects.contains(&effect);
+    let has = |effect: Effect| move |effects: &EffectSet| effects.contains(&effect);
+    let glass = |effects: &EffectSet| has(Effect::Transmission)(effects) && !has(Effect::Unlit)(effects);
+    let bends = [Effect::NormalMap, Effect::Anisotropy, Effect::Clearcoat];
     vec![
-        pass("pass opaque", &|material| !has(Effect::AlphaBlend)(material), "every material is blended"),
-        pass(
-            "picture of the opaque scene for what shines through",
-            &|material| has(Effect::Transmission)(material) && !has(Effect::Unlit)(material),
-            "no material transmits light",
-        ),
-        pass("pass blended, sorted by depth", &has(Effect::AlphaBlend), "no material is transparent"),
-        pass("light loops", &has(Effect::PunctualLights), "no lit scene has lights of its own"),
-        pass(
-            "tangents",
-            &|material| {
-                [Effect::NormalMap, Effect::Anisotropy, Effect::Clearcoat]
-                    .iter()
-                    .any(|effect| material.effects.contains(effect))
-            },
-            "no material bends normals or is brushed",
-        ),
+        pass("pass opaque", "every material is blended", &|effects| !has(Effect::AlphaBlend)(effects)),
+        pass("picture of what stands behind glass", "no material transmits light", &glass),
+        pass("pass blended, sorted by depth", "no material is transparent", &has(Effect::AlphaBlend)),
+        pass("light loops", "no lit scene has lights of its own", &has(Effect::PunctualLights)),
+        pass("tangents", "no material bends normals or is brushed", &|effects| {
+            bends.iter().any(|effect| effects.contains(effect))
+        }),
+        pass("skin uploads", "no animation moves what vertices hang on", &has(Effect::Skin)),
+        pass("morph uploads", "no animation changes a morph target's weight", &has(Effect::Morph)),
+        pass("instancing", "nothing is drawn in copies", &has(Effect::Instancing)),
     ]
 }
