@@ -186,7 +186,13 @@ impl Daemon {
         while let Ok(event) = self.events.recv() {
             match event {
                 Event::Stop => return self.builder.cancel(),
-                Event::Client(event) => notify(Notice::Client(event)),
+                Event::Client(event) => {
+                    let is_stop = event == ServerEvent::StopAsked;
+                    notify(Notice::Client(event));
+                    if is_stop {
+                        return self.builder.cancel();
+                    }
+                }
                 Event::ContentLost => {
                     self.is_incomplete = true;
                     if self.building.is_none() {
@@ -214,6 +220,7 @@ impl Daemon {
 
     fn begin_build(&mut self, batch: Batch) {
         self.building = Some(Batch::default());
+        self.server.set_building(Some(batch.files.iter().cloned().collect()));
         self.builder.request(batch);
     }
 
@@ -236,6 +243,7 @@ impl Daemon {
             BuildResult::Done(_) | BuildResult::Failed(_) => Batch::default(),
         };
         unseen.merge(self.building.take().unwrap_or_default());
+        self.server.set_building(None);
         // Before anybody hears of the build: what is edited in answer to it must be noticed.
         // Sources that became relevant with this build may have changed before they were watched, and a link may lead
         // elsewhere now.

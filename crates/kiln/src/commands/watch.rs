@@ -84,6 +84,7 @@ impl Screen {
         match event {
             ServerEvent::Connected { client, name } => say!("client {client} ({name}) connected"),
             ServerEvent::Gone { client, reason } => say!("client {client} left: {reason}"),
+            ServerEvent::StopAsked => say!("asked to end"),
             ServerEvent::Frame { client, report } => {
                 let since =
                     if self.noticed_unix_ms > 0.0 { self.noticed_unix_ms } else { self.published_unix_ms };
@@ -121,5 +122,6 @@ fn to_json(notice: &Notice) -> serde_json::Value {
         Notice::Client(ServerEvent::Frame { client, report }) => {
             json!({"event": "frame", "client": client, "report": report})
         }
+        Notice::Client(ServerEvent::StopAsked) => json!({"event": "stop asked"}),
     }
 }

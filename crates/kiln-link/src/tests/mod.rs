@@ -9,7 +9,7 @@ use kiln_build::Digest;
 use serde_json::json;
 
 use crate::session::ClientSession;
-use crate::wire::{FRAME_BYTES_MAX, Message};
+use crate::wire::{Message, SERVER_FRAME_BYTES_MAX};
 use crate::*;
 
 const LIMIT: Duration = Duration::from_secs(20);
@@ -116,7 +116,7 @@ fn stuck_client_does_not_hold_up_the_others() {
     let big = vec![1; 8 << 20];
     let bench = serve(&[&big]);
     let mut stuck = UnixStream::connect(&bench.socket).unwrap();
-    let hello = ClientMessage::Hello { protocol: PROTOCOL_VERSION, name: "stuck".into() };
+    let hello = ClientMessage::Hello(Hello::new("stuck", &[capability::REVISIONS]));
     stuck.write_all(&hello.encode()).unwrap();
     stuck.write_all(&ClientMessage::Fetch(vec![Digest::of(&big)]).encode()).unwrap();
     assert!(matches!(bench.events.recv_timeout(LIMIT).unwrap(), ServerEvent::Connected { .. }));
@@ -131,7 +131,7 @@ fn stuck_client_does_not_hold_up_the_others() {
 fn peer_of_another_version_is_told_so() {
     let bench = serve(&[]);
     let mut stream = UnixStream::connect(&bench.socket).unwrap();
-    let hello = ClientMessage::Hello { protocol: PROTOCOL_VERSION + 1, name: "new".into() };
+    let hello = ClientMessage::Hello(Hello { protocol: PROTOCOL_VERSION + 1, ..Hello::new("new", &[]) });
     stream.write_all(&hello.encode()).unwrap();
     let mut answer = Vec::new();
     stream.set_read_timeout(Some(LIMIT)).unwrap();
@@ -142,14 +142,14 @@ fn peer_of_another_version_is_told_so() {
     assert!(ClientSession::default().receive(message).is_ok());
     let gone = bench.events.recv_timeout(LIMIT).unwrap();
     assert!(matches!(&gone, ServerEvent::Gone { reason, .. } if reason.contains("protocol")), "{gone:?}");
-    let other = ServerMessage::Hello { protocol: PROTOCOL_VERSION + 1, project: "p".into() };
+    let other = ServerMessage::Hello(Hello { protocol: PROTOCOL_VERSION + 1, ..Hello::new("p", &[]) });
     assert!(ClientSession::default().receive(other).is_err_and(|reason| reason.contains("update")));
 }
 
 #[test]
 fn messages_survive_being_cut_anywhere() {
     let messages = [
-        ServerMessage::Hello { protocol: 1, project: "p".into() },
+        ServerMessage::Hello(Hello::new("p", &["x"])),
         ServerMessage::Revision(table(3, &[b"a", b"b"])),
         ServerMessage::Chunk { digest: Digest::of(b"a"), offset: 0, total: 1, bytes: b"a".to_vec() },
         ServerMessage::Missing(Digest::of(b"z")),
@@ -171,7 +171,7 @@ fn messages_survive_being_cut_anywhere() {
 
 #[test]
 fn hostile_frames_are_refused() {
-    let too_long = u32::try_from(FRAME_BYTES_MAX + 1).unwrap().to_le_bytes();
+    let too_long = u32::try_from(SERVER_FRAME_BYTES_MAX + 1).unwrap().to_le_bytes();
     let cases: [&[u8]; 5] = [
         &too_long,
         &[0, 0, 0, 0],
@@ -189,7 +189,7 @@ fn hostile_frames_are_refused() {
 
 fn greeted() -> ClientSession {
     let mut session = ClientSession::default();
-    session.receive(ServerMessage::Hello { protocol: PROTOCOL_VERSION, project: "p".into() }).unwrap();
+    session.receive(ServerMessage::Hello(Hello::new("p", &[]))).unwrap();
     session
 }
 
