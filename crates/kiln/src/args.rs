@@ -52,6 +52,10 @@ pub(crate) enum Command {
     Doctor(DoctorArgs),
     /// Bake, then follow every edit and publish it to connected previews
     Watch(WatchArgs),
+    /// Say whether a project is watched, what is published and building, and what its clients show; exit code 1 if it is not
+    Status(StatusArgs),
+    /// End the `kiln watch` of a project and wait until it is gone; exit code 0 too if there is none
+    Stop(StopArgs),
     /// Show what a watching kiln publishes, in a window or as PNG files
     #[cfg(feature = "preview")]
     Preview(PreviewArgs),
@@ -360,6 +364,26 @@ pub(crate) struct WatchArgs {
     /// Do not write baked files, only publish to previews
     #[arg(long)]
     pub(crate) no_output: bool,
+    /// Also look at the files themselves this often, as 500ms or 2s: for file systems that tell of no change (a network's)
+    #[arg(long, value_name = "TIME", value_parser = parse_poll, num_args = 0..=1, default_missing_value = "1s", require_equals = true)]
+    pub(crate) poll: Option<std::time::Duration>,
+}
+
+#[derive(Debug, ClapArgs)]
+pub(crate) struct StatusArgs {
+    /// The project's folder
+    #[arg(default_value = ".")]
+    pub(crate) dir: PathBuf,
+    /// Print JSON instead of text
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, ClapArgs)]
+pub(crate) struct StopArgs {
+    /// The project's folder
+    #[arg(default_value = ".")]
+    pub(crate) dir: PathBuf,
 }
 
 #[cfg(feature = "preview")]

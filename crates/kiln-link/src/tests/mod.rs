@@ -1,3 +1,9 @@
+//! Both halves of the wire: over real sockets, and message by message.
+
+mod control;
+mod python;
+mod queue;
+
 use std::collections::{BTreeMap, HashMap};
 use std::io::{Read as _, Write as _};
 use std::os::unix::net::UnixStream;
@@ -118,6 +124,7 @@ fn stuck_client_does_not_hold_up_the_others() {
     let mut stuck = UnixStream::connect(&bench.socket).unwrap();
     let hello = ClientMessage::Hello(Hello::new("stuck", &[capability::REVISIONS]));
     stuck.write_all(&hello.encode()).unwrap();
+    bench.server.publish(Arc::new(table(0, &[&big])));
     stuck.write_all(&ClientMessage::Fetch(vec![Digest::of(&big)]).encode()).unwrap();
     assert!(matches!(bench.events.recv_timeout(LIMIT).unwrap(), ServerEvent::Connected { .. }));
     let client = Client::connect(bench.socket.clone(), "quick");
