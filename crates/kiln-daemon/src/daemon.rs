@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 use kiln_build::{Engine, Error, Store};
 use kiln_link::{LockError, ProjectLock, RevisionTable, Server, ServerEvent, socket_path};
@@ -27,6 +27,8 @@ pub struct DaemonOptions {
     pub cache_bytes_max: u64,
     /// Whether baked files are written after each build.
     pub write_outputs: bool,
+    /// How often an idle daemon looks at all files itself, where the system may not tell of every change.
+    pub poll: Option<Duration>,
 }
 
 /// Why a daemon could not start.
@@ -146,6 +148,7 @@ impl Daemon {
             memory_bytes: options.memory_bytes,
             cache_bytes_max: options.cache_bytes_max,
             write_outputs: options.write_outputs,
+            poll: options.poll,
         };
         let builder = Builder::start(engine.clone(), server.clone(), builder_options, move |result| {
             // Fails only when the daemon has ended.

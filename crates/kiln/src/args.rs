@@ -365,7 +365,7 @@ pub(crate) struct WatchArgs {
     #[arg(long)]
     pub(crate) no_output: bool,
     /// Also look at the files themselves this often, as 500ms or 2s: for file systems that tell of no change (a network's)
-    #[arg(long, value_name = "TIME", value_parser = parse_poll, num_args = 0..=1, default_missing_value = "1s", require_equals = true)]
+    #[arg(long, value_name = "TIME", value_parser = parse_poll)]
     pub(crate) poll: Option<std::time::Duration>,
 }
 
@@ -529,6 +529,16 @@ pub(crate) struct DemoArgs {
 
 fn parse_bytes(text: &str) -> Result<u64, String> {
     kiln_project::parse_bytes(text).ok_or_else(|| format!("`{text}` is no size; write it as 2GiB or 500MB"))
+}
+
+fn parse_poll(text: &str) -> Result<std::time::Duration, String> {
+    let wrong = || format!("`{text}` is no time to poll at; write it as 500ms or 2s, from 50ms to 1h");
+    let (number, unit_ms) = match text.strip_suffix("ms") {
+        Some(number) => (number, 1),
+        None => (text.strip_suffix('s').ok_or_else(wrong)?, 1000),
+    };
+    let ms = number.parse::<u64>().ok().and_then(|number| number.checked_mul(unit_ms)).ok_or_else(wrong)?;
+    (50..=3_600_000).contains(&ms).then(|| std::time::Duration::from_millis(ms)).ok_or_else(wrong)
 }
 
 fn parse_size(text: &str) -> Result<[u32; 2], String> {

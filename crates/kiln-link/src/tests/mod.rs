@@ -1,6 +1,7 @@
 //! Both halves of the wire: over real sockets, and message by message.
 
 mod control;
+mod fuzz;
 mod python;
 mod queue;
 

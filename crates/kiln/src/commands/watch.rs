@@ -21,6 +21,7 @@ pub(crate) fn run(args: &WatchArgs) -> anyhow::Result<ExitCode> {
         memory_bytes: place::memory_bytes(args.build.memory),
         cache_bytes_max: place::cache_bytes_max()?,
         write_outputs: !args.no_output,
+        poll: args.poll,
     };
     let daemon = match Daemon::start(&options) {
         Err(DaemonError::Lock(error)) => {
