@@ -96,7 +96,8 @@ impl Talk {
     fn next(&mut self) -> Result<Option<ServerMessage>, ControlError> {
         let mut buffer = vec![0; 64 << 10];
         loop {
-            let message = self.decoder.next_message().map_err(|error| ControlError::Protocol(error.to_string()))?;
+            let message =
+                self.decoder.next_message().map_err(|error| ControlError::Protocol(error.to_string()))?;
             if message.is_some() {
                 return Ok(message);
             }

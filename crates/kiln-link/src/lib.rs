@@ -10,8 +10,8 @@
 //! Not here: what targets mean, when to build (`kiln-daemon`), pixels (`kiln-preview`).
 
 pub use client::{Client, ClientEvent};
-pub use kiln_build::{Digest, Part, Target, TargetState, Targets};
 pub use control::{ControlError, status, stop};
+pub use kiln_build::{Digest, Part, Target, TargetState, Targets};
 pub use message::{
     ClientMessage, FrameReport, Hello, PROTOCOL_VERSION, ProgressReport, ServerMessage, Wants, capability,
 };

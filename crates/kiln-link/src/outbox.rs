@@ -131,12 +131,7 @@ impl Outbox {
         }
     }
 
-    fn write_content(
-        &self,
-        blobs: &BlobSource,
-        stream: &mut UnixStream,
-        step: Step,
-    ) -> std::io::Result<()> {
+    fn write_content(&self, blobs: &BlobSource, stream: &mut UnixStream, step: Step) -> std::io::Result<()> {
         match step {
             Step::Read(digest) => match blobs(&digest) {
                 Some(bytes) => self.state().queue.begin(digest, bytes),

@@ -51,7 +51,9 @@ pub struct ProjectLock {
 #[derive(Debug, thiserror::Error)]
 pub enum LockError {
     /// Another daemon serves it.
-    #[error("process {pid} already watches this project; connect to it with `kiln preview`, or end it with `kiln stop`")]
+    #[error(
+        "process {pid} already watches this project; connect to it with `kiln preview`, or end it with `kiln stop`"
+    )]
     Held {
         /// The other daemon.
         pid: String,

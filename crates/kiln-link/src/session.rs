@@ -57,8 +57,7 @@ impl ClientSession {
             _ if !self.greeted => return Err("the daemon did not begin with a greeting".to_owned()),
             ServerMessage::Revision(table) => {
                 let wanted = digests(&table);
-                self.contents
-                    .retain(|digest, _| wanted.contains(digest) || self.delivered.contains(digest));
+                self.contents.retain(|digest, _| wanted.contains(digest) || self.delivered.contains(digest));
                 self.pending = Some(table);
                 self.request_missing(&mut reaction);
                 self.commit_if_whole(&mut reaction);

@@ -229,9 +229,7 @@ impl Message for ServerMessage {
             SERVER_PROGRESS => Ok(ServerMessage::Progress(parse::<ProgressReport>(kind, payload)?)),
             SERVER_PING => Ok(ServerMessage::Ping(parse_number(kind, payload)?)),
             SERVER_PONG => Ok(ServerMessage::Pong(parse_number(kind, payload)?)),
-            SERVER_STATUS => {
-                Ok(ServerMessage::Status(Box::new(parse::<DaemonStatus>(kind, payload)?)))
-            }
+            SERVER_STATUS => Ok(ServerMessage::Status(Box::new(parse::<DaemonStatus>(kind, payload)?))),
             other => Err(WireError::Type(other)),
         }
     }
@@ -244,8 +242,7 @@ pub(crate) fn encode_revision(table: &RevisionTable) -> Vec<u8> {
 
 /// What stands before the `length` bytes of a chunk.
 pub(crate) fn chunk_header(digest: &Digest, offset: u64, total: u64, length: usize) -> Vec<u8> {
-    let mut header =
-        frame(SERVER_CHUNK, &[digest.as_bytes(), &offset.to_le_bytes(), &total.to_le_bytes()]);
+    let mut header = frame(SERVER_CHUNK, &[digest.as_bytes(), &offset.to_le_bytes(), &total.to_le_bytes()]);
     let bytes = u32::try_from(1 + CHUNK_HEADER_BYTES + length).unwrap_or(u32::MAX);
     header[..4].copy_from_slice(&bytes.to_le_bytes());
     header

@@ -31,8 +31,7 @@ fn status_says_what_is_published_and_built_and_who_looks() {
     assert_eq!((empty.revision, empty.pid, empty.project.as_str()), (0, std::process::id(), "test"));
     assert!(empty.clients.is_empty() && empty.building.is_none(), "who asks is no client");
     let mut revision = table(7, &[b"x"]);
-    revision.diagnostics =
-        vec![Diagnostic::error("shader is broken"), Diagnostic::warning("sky is dark")];
+    revision.diagnostics = vec![Diagnostic::error("shader is broken"), Diagnostic::warning("sky is dark")];
     revision.targets.values_mut().for_each(|target| target.state = TargetState::Stale);
     bench.server.publish(Arc::new(revision));
     bench.server.set_building(Some(vec!["a.wgsl".into()]));
@@ -54,7 +53,10 @@ fn status_says_what_is_published_and_built_and_who_looks() {
     });
     assert_eq!((status.revision, status.targets), (7, 1));
     assert_eq!(status.stale, ["env/a/specular"]);
-    assert_eq!(status.errors.iter().map(|error| error.message.as_str()).collect::<Vec<_>>(), ["shader is broken"]);
+    assert_eq!(
+        status.errors.iter().map(|error| error.message.as_str()).collect::<Vec<_>>(),
+        ["shader is broken"]
+    );
     let building = status.building.unwrap();
     assert_eq!((building.files, building.progress.done), (vec!["a.wgsl".to_owned()], 1));
     let viewer = &status.clients[0];
@@ -84,9 +86,7 @@ fn wants_are_said_again_to_the_next_daemon() {
     status_when(&bench.socket, |status| status.clients.iter().any(|viewer| !viewer.wants.is_empty()));
     drop(bench.server);
     let _next = Server::bind(&bench.socket, "test", Box::new(|_| None), Box::new(drop)).unwrap();
-    status_when(&bench.socket, |status| {
-        status.clients.iter().any(|viewer| viewer.wants == ["scene/balls"])
-    });
+    status_when(&bench.socket, |status| status.clients.iter().any(|viewer| viewer.wants == ["scene/balls"]));
 }
 
 #[test]
@@ -151,21 +151,20 @@ fn frames_that_cannot_be_are_not_passed_on() {
     bench.server.publish(Arc::new(table(1, &[])));
     let client = Client::connect(bench.socket.clone(), "viewer");
     next_revision(&client);
-    let report = |revision| FrameReport {
-        revision,
-        received_unix_ms: 1.0,
-        ready_unix_ms: 2.0,
-        drawn_unix_ms: 3.0,
-    };
+    let report =
+        |revision| FrameReport { revision, received_unix_ms: 1.0, ready_unix_ms: 2.0, drawn_unix_ms: 3.0 };
     [99, 1, 1, 1].map(report).into_iter().for_each(|report| client.report_frame(report));
     drop(client);
     let events: Vec<ServerEvent> = bench.events.iter().take(3).collect();
     assert!(
-        matches!(&events[..], [
-            ServerEvent::Connected { .. },
-            ServerEvent::Frame { report: FrameReport { revision: 1, .. }, .. },
-            ServerEvent::Gone { .. }
-        ]),
+        matches!(
+            &events[..],
+            [
+                ServerEvent::Connected { .. },
+                ServerEvent::Frame { report: FrameReport { revision: 1, .. }, .. },
+                ServerEvent::Gone { .. }
+            ]
+        ),
         "{events:?}"
     );
 }

@@ -161,7 +161,10 @@ fn damaged_talk_of_a_daemon_gives_true_revisions_or_none() {
         refused += usize::from(outcome.refused);
         revisions += outcome.revisions;
     }
-    eprintln!("{} talks of a daemon damaged: {refused} refused, {revisions} revisions, all true", talk_count());
+    eprintln!(
+        "{} talks of a daemon damaged: {refused} refused, {revisions} revisions, all true",
+        talk_count()
+    );
     assert!(refused > 0 && revisions > 0, "the damage is too weak or too strong to show anything");
 }
 
@@ -194,10 +197,8 @@ fn talk_cut_at_any_byte_is_taken_up_by_the_next_connection() {
 /// Greets a session again and tells it the same table; returns what it asks for.
 fn fetches_after_reset(session: &mut ClientSession) -> Vec<Digest> {
     let mut fetched = Vec::new();
-    for message in [
-        ServerMessage::Hello(Hello::new("p", &[])),
-        ServerMessage::Revision(table(1, &CONTENTS)),
-    ] {
+    for message in [ServerMessage::Hello(Hello::new("p", &[])), ServerMessage::Revision(table(1, &CONTENTS))]
+    {
         for answer in session.receive(message).unwrap().send {
             let ClientMessage::Fetch(digests) = answer else { continue };
             fetched.extend(digests);
@@ -340,7 +341,9 @@ fn floods_and_oversize_messages_end_their_connection_alone() {
         assert!(reason.contains("frame") || reason.contains("asked for more"), "{reason}");
     }
     let harmless: Vec<u8> = std::iter::repeat_n(
-        [ClientMessage::Ping(1), ClientMessage::Pong(1), ClientMessage::Status].map(|message| message.encode()).concat(),
+        [ClientMessage::Ping(1), ClientMessage::Pong(1), ClientMessage::Status]
+            .map(|message| message.encode())
+            .concat(),
         20_000,
     )
     .flatten()
@@ -352,9 +355,8 @@ fn floods_and_oversize_messages_end_their_connection_alone() {
 #[test]
 fn deep_json_is_refused_and_does_not_exhaust_the_stack() {
     let deep = "[".repeat(1 << 20);
-    let meta = format!(
-        r#"{{"number":1,"targets":{{"a":{{"kind":"k","state":"fresh","parts":[],"meta":{deep}"#
-    );
+    let meta =
+        format!(r#"{{"number":1,"targets":{{"a":{{"kind":"k","state":"fresh","parts":[],"meta":{deep}"#);
     assert!(ServerMessage::decode(66, meta.as_bytes()).is_err());
     assert!(ClientMessage::decode(4, format!(r#"{{"targets":{deep}"#).as_bytes()).is_err());
     assert!(ClientMessage::decode(2, deep.as_bytes()).is_err());

@@ -18,7 +18,9 @@ fn client_written_from_the_document_gets_everything() {
     let run = Command::new("python3").arg(script).arg(&bench.socket).arg(out.path()).output();
     let run = match run {
         Ok(run) => run,
-        Err(error) => return eprintln!("SKIPPED: client_written_from_the_document_gets_everything: python3: {error}"),
+        Err(error) => {
+            return eprintln!("SKIPPED: client_written_from_the_document_gets_everything: python3: {error}");
+        }
     };
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
     let said: Value = serde_json::from_slice(&run.stdout).unwrap();

@@ -11,7 +11,8 @@ use crate::wire::CHUNK_BYTES;
 use crate::{Part, RevisionTable, Target, TargetState, Wants};
 
 fn target(kind: &str, contents: &[Vec<u8>]) -> Target {
-    let part = |bytes: &Vec<u8>| Part { name: "p".into(), digest: Digest::of(bytes), bytes: bytes.len() as u64 };
+    let part =
+        |bytes: &Vec<u8>| Part { name: "p".into(), digest: Digest::of(bytes), bytes: bytes.len() as u64 };
     Target {
         kind: kind.into(),
         state: TargetState::Fresh,

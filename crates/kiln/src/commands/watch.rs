@@ -76,6 +76,9 @@ impl Screen {
                 report::print_diagnostics(&table.diagnostics, table.number == 1);
                 say!("  {}", report::revision_line(table));
             }
+            Notice::Unfinished { files } => {
+                say!("  {} being written; waiting for the rest", files.join(", "))
+            }
             Notice::Failed(reason) => eprintln!("  the tool failed: {reason}; what was published stays"),
             Notice::Client(event) => self.show_client(event),
         }
@@ -113,6 +116,7 @@ fn to_json(notice: &Notice) -> serde_json::Value {
                 (name.clone(), json!({"state": target.state, "sha256": target.digest(), "bytes": target.bytes()}))
             }).collect::<serde_json::Map<_, _>>(),
         }),
+        Notice::Unfinished { files } => json!({"event": "unfinished", "files": files}),
         Notice::Failed(reason) => json!({"event": "failed", "reason": reason}),
         Notice::Client(ServerEvent::Connected { client, name }) => {
             json!({"event": "client connected", "client": client, "name": name})
