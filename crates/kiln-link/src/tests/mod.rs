@@ -1,5 +1,7 @@
 //! Both halves of the wire: over real sockets, and message by message.
 
+#![expect(clippy::print_stderr, reason = "what was skipped and what a long run found is said")]
+
 mod control;
 mod fuzz;
 mod python;
