@@ -254,3 +254,40 @@ fn second_lock_names_the_holder() {
     drop(held);
     ProjectLock::take(&socket).unwrap();
 }
+
+#[test]
+fn shader_asked_for_in_the_middle_of_a_cube_comes_within_a_few_chunks() {
+    let (cube, shader) = (vec![1; 60_000_000], b"fn main() {}");
+    let bench = serve(&[&cube, shader]);
+    let mut revision = table(1, &[&cube]);
+    let compiled = Target { kind: "shader".into(), ..table(1, &[shader]).targets["env/a/specular"].clone() };
+    revision.targets.insert("shader/pbr/base".to_owned(), compiled);
+    bench.server.publish(Arc::new(revision));
+    let mut stream = UnixStream::connect(&bench.socket).unwrap();
+    stream.set_read_timeout(Some(LIMIT)).unwrap();
+    let hello = ClientMessage::Hello(Hello::new("raw", &[capability::REVISIONS]));
+    stream.write_all(&hello.encode()).unwrap();
+    let (mut decoder, mut buffer) = (Decoder::default(), vec![0; 64 << 10]);
+    let mut next = |stream: &mut UnixStream| loop {
+        if let Some(message) = decoder.next_message::<ServerMessage>().unwrap() {
+            return message;
+        }
+        let count = stream.read(&mut buffer).unwrap();
+        assert!(count > 0, "the server hung up");
+        decoder.push(&buffer[..count]);
+    };
+    while !matches!(next(&mut stream), ServerMessage::Revision(_)) {}
+    stream.write_all(&ClientMessage::Fetch(vec![Digest::of(&cube)]).encode()).unwrap();
+    while !matches!(next(&mut stream), ServerMessage::Chunk { .. }) {}
+    stream.write_all(&ClientMessage::Fetch(vec![Digest::of(shader)]).encode()).unwrap();
+    let mut overtaken_bytes = 0;
+    loop {
+        match next(&mut stream) {
+            ServerMessage::Chunk { digest, .. } if digest == Digest::of(shader) => break,
+            ServerMessage::Chunk { bytes, .. } => overtaken_bytes += bytes.len(),
+            _ => {}
+        }
+    }
+    // What was in the socket already, and a thread that the system lets wait while this one reads on.
+    assert!(overtaken_bytes < 16 << 20, "{overtaken_bytes} bytes of the cube came first");
+}
