@@ -77,7 +77,7 @@ impl Screen {
                 say!("  {}", report::revision_line(table));
             }
             Notice::Unfinished { files } => {
-                say!("  {} being written; waiting for the rest", files.join(", "))
+                say!("  {} being written; waiting for the rest", files.join(", "));
             }
             Notice::Failed(reason) => eprintln!("  the tool failed: {reason}; what was published stays"),
             Notice::Client(event) => self.show_client(event),
