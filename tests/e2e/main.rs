@@ -7,6 +7,7 @@
 mod bad_input;
 mod bake;
 mod ci;
+mod control;
 mod corpus;
 mod demand;
 mod demo;

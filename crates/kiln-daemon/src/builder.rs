@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
 use kiln_build::{ActionId, Digest, Engine, Error, Outcome, RunOptions, Status};
@@ -54,6 +54,7 @@ pub(crate) struct BuilderOptions {
     pub(crate) memory_bytes: u64,
     pub(crate) cache_bytes_max: u64,
     pub(crate) write_outputs: bool,
+    pub(crate) poll: Option<Duration>,
 }
 
 impl Builder {
@@ -100,7 +101,7 @@ impl BuilderThread {
         // The watcher tells what changes from here on; before it, anything may have.
         let mut knows_all = false;
         let mut next = None;
-        while let Some(batch) = next.take().or_else(|| requests.recv().ok()) {
+        while let Some(batch) = next.take().or_else(|| self.wait(requests, built)) {
             self.waiting.fetch_sub(1, Ordering::SeqCst);
             let changed: Option<Vec<String>> =
                 (knows_all && !batch.files.is_empty()).then(|| batch.files.iter().cloned().collect());
@@ -135,6 +136,21 @@ impl BuilderThread {
         }
     }
 
+    /// The next request; while there is none, files are looked at as often as asked for.
+    fn wait(&self, requests: &Receiver<Batch>, built: &impl Fn(BuildResult)) -> Option<Batch> {
+        let Some(poll) = self.options.poll else { return requests.recv().ok() };
+        loop {
+            match requests.recv_timeout(poll) {
+                Ok(batch) => return Some(batch),
+                Err(RecvTimeoutError::Disconnected) => return None,
+                Err(RecvTimeoutError::Timeout) => {}
+            }
+            if let Some(batch) = self.look_for_overlooked(requests, built) {
+                return Some(batch);
+            }
+        }
+    }
+
     /// A file system may not tell of every change (a network's, a link that leads elsewhere now): while there is nothing
     /// else to do all files are looked at, by `stat` alone. A change that is told of a moment later is no such one: then
     /// its request is returned.
@@ -145,7 +161,7 @@ impl BuilderThread {
         if changed.is_empty() {
             return None;
         }
-        match requests.recv_timeout(TOLD_WITHIN) {
+        match requests.recv_timeout(self.options.poll.map_or(TOLD_WITHIN, |poll| poll.min(TOLD_WITHIN))) {
             Ok(batch) => Some(batch),
             Err(_) => {
                 built(BuildResult::Overlooked(changed));

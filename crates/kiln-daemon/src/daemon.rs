@@ -1,16 +1,17 @@
 //! The loop.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender, channel};
-use std::time::SystemTime;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::time::{Duration, Instant, SystemTime};
 
 use kiln_build::{Engine, Error, Store};
+use kiln_diagnostic::Diagnostic;
 use kiln_link::{LockError, ProjectLock, RevisionTable, Server, ServerEvent, socket_path};
 
 use crate::builder::{BuildResult, Builder, BuilderOptions};
-use crate::watch::{Batch, Watch, send_batches, unix_ms};
+use crate::watch::{Batch, UNFINISHED, Watch, send_batches, unix_ms};
 
 /// How to serve a project.
 #[derive(Clone, Debug)]
@@ -27,6 +28,8 @@ pub struct DaemonOptions {
     pub cache_bytes_max: u64,
     /// Whether baked files are written after each build.
     pub write_outputs: bool,
+    /// How often an idle daemon looks at all files itself, where the system may not tell of every change.
+    pub poll: Option<Duration>,
 }
 
 /// Why a daemon could not start.
@@ -66,6 +69,12 @@ pub enum Notice {
     },
     /// A new revision is out.
     Published(Arc<RevisionTable>),
+    /// These files are being written and cannot be read yet; what is wrong with them is not published until they are whole
+    /// or nobody has written to them for a while.
+    Unfinished {
+        /// Files with an error.
+        files: Vec<String>,
+    },
     /// The tool could not do its work; what was published stays.
     Failed(String),
     /// A client did something.
@@ -108,6 +117,8 @@ pub struct Daemon {
     building: Option<Batch>,
     /// A client lacks a content of what is published: the next build is published even if it changes nothing.
     is_incomplete: bool,
+    /// When to build again what was unfinished, unless somebody goes on writing.
+    retry: Option<(Instant, BTreeSet<String>)>,
     /// Sources that are watched.
     relevant: Vec<String>,
     /// [`kiln_build::SourceTree::names_version`] of them.
@@ -146,6 +157,7 @@ impl Daemon {
             memory_bytes: options.memory_bytes,
             cache_bytes_max: options.cache_bytes_max,
             write_outputs: options.write_outputs,
+            poll: options.poll,
         };
         let builder = Builder::start(engine.clone(), server.clone(), builder_options, move |result| {
             // Fails only when the daemon has ended.
@@ -162,6 +174,7 @@ impl Daemon {
             published: None,
             building: None,
             is_incomplete: false,
+            retry: None,
             relevant: Vec::new(),
             relevant_version: 0,
             _lock: lock,
@@ -183,10 +196,16 @@ impl Daemon {
     /// Serves until stopped.
     pub fn run(mut self, notify: &mut dyn FnMut(Notice)) {
         notify(Notice::Building { files: Vec::new() });
-        while let Ok(event) = self.events.recv() {
+        while let Some(event) = self.next_event(notify) {
             match event {
                 Event::Stop => return self.builder.cancel(),
-                Event::Client(event) => notify(Notice::Client(event)),
+                Event::Client(event) => {
+                    let is_stop = event == ServerEvent::StopAsked;
+                    notify(Notice::Client(event));
+                    if is_stop {
+                        return self.builder.cancel();
+                    }
+                }
                 Event::ContentLost => {
                     self.is_incomplete = true;
                     if self.building.is_none() {
@@ -195,6 +214,24 @@ impl Daemon {
                 }
                 Event::Files(batch) => self.take_files(batch, notify),
                 Event::Built(result) => self.end_build(result, notify),
+            }
+        }
+    }
+
+    /// The next event; meanwhile what is due is done. `None` when nobody can send one.
+    fn next_event(&mut self, notify: &mut dyn FnMut(Notice)) -> Option<Event> {
+        loop {
+            let Some((due, _)) = &self.retry else { return self.events.recv().ok() };
+            match self.events.recv_timeout(due.saturating_duration_since(Instant::now())) {
+                Ok(event) => return Some(event),
+                Err(RecvTimeoutError::Disconnected) => return None,
+                Err(RecvTimeoutError::Timeout) => {}
+            }
+            // A build in flight looks at the files anyway.
+            if let Some((_, files)) = self.retry.take()
+                && self.building.is_none()
+            {
+                self.take_files(Batch::now(files.into_iter().collect()), notify);
             }
         }
     }
@@ -214,6 +251,7 @@ impl Daemon {
 
     fn begin_build(&mut self, batch: Batch) {
         self.building = Some(Batch::default());
+        self.server.set_building(Some(batch.files.iter().cloned().collect()));
         self.builder.request(batch);
     }
 
@@ -236,6 +274,7 @@ impl Daemon {
             BuildResult::Done(_) | BuildResult::Failed(_) => Batch::default(),
         };
         unseen.merge(self.building.take().unwrap_or_default());
+        self.server.set_building(None);
         // Before anybody hears of the build: what is edited in answer to it must be noticed.
         // Sources that became relevant with this build may have changed before they were watched, and a link may lead
         // elsewhere now.
@@ -256,7 +295,10 @@ impl Daemon {
             self.relevant = relevant;
         }
         match result {
-            BuildResult::Done(table) => self.publish(*table, notify),
+            BuildResult::Done(table) => {
+                let table = self.without_unfinished(*table, &unseen, notify);
+                self.publish(table, notify);
+            }
             BuildResult::Failed(error) => notify(Notice::Failed(error.to_string())),
             BuildResult::Cancelled(_) | BuildResult::OutputsFailed(_) | BuildResult::Overlooked(_) => {}
         }
@@ -264,6 +306,25 @@ impl Daemon {
             notify(Notice::Building { files: unseen.files.iter().cloned().collect() });
             self.begin_build(unseen);
         }
+    }
+
+    /// The table as it would be had the files that are just being written not been looked at.
+    fn without_unfinished(
+        &mut self,
+        mut table: RevisionTable,
+        unseen: &Batch,
+        notify: &mut dyn FnMut(Notice),
+    ) -> RevisionTable {
+        let Some(last) = &self.published else { return table };
+        let mut unfinished = self.watch.being_written();
+        unfinished.extend(unseen.files.iter().cloned());
+        let failed = hide_errors_of(&mut table, last, &unfinished);
+        self.retry = None;
+        if !failed.is_empty() {
+            notify(Notice::Unfinished { files: failed.iter().cloned().collect() });
+            self.retry = Some((Instant::now() + UNFINISHED, failed));
+        }
+        table
     }
 
     fn publish(&mut self, mut table: RevisionTable, notify: &mut dyn FnMut(Notice)) {
@@ -282,6 +343,44 @@ impl Daemon {
         self.published = Some(table.clone());
         notify(Notice::Published(table));
     }
+}
+
+/// Says of these files what the last table said; returns those that have an error now. A target that became stale is as it was,
+/// unless something else is wrong too.
+fn hide_errors_of(
+    table: &mut RevisionTable,
+    last: &RevisionTable,
+    files: &BTreeSet<String>,
+) -> BTreeSet<String> {
+    let is_of = |files: &BTreeSet<String>, diagnostic: &Diagnostic| {
+        diagnostic.file.as_ref().is_some_and(|file| files.contains(file))
+    };
+    let errors =
+        table.diagnostics.iter().filter(|diagnostic| diagnostic.is_error() && is_of(files, diagnostic));
+    let failed: BTreeSet<String> = errors.filter_map(|diagnostic| diagnostic.file.clone()).collect();
+    if failed.is_empty() {
+        return failed;
+    }
+    table.diagnostics.retain(|diagnostic| !is_of(&failed, diagnostic));
+    let is_new_error =
+        |diagnostic: &Diagnostic| diagnostic.is_error() && !last.diagnostics.contains(diagnostic);
+    if !table.diagnostics.iter().any(is_new_error) {
+        for (name, target) in &mut table.targets {
+            if let Some(before) = last.targets.get(name)
+                && before.parts == target.parts
+                && before.meta == target.meta
+            {
+                target.state = before.state;
+            }
+        }
+    }
+    table
+        .diagnostics
+        .extend(last.diagnostics.iter().filter(|diagnostic| is_of(&failed, diagnostic)).cloned());
+    // In the order of the last table, so that equal ones are seen to be equal.
+    let place = |diagnostic: &Diagnostic| last.diagnostics.iter().position(|known| known == diagnostic);
+    table.diagnostics.sort_by_key(|diagnostic| place(diagnostic).unwrap_or(usize::MAX));
+    failed
 }
 
 fn client_events(sender: Sender<Event>) -> Box<dyn Fn(ServerEvent) + Send + Sync> {

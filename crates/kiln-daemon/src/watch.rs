@@ -15,6 +15,9 @@ const QUIET_AFTER_SAVE: Duration = Duration::from_millis(2);
 /// … or when it has gone on for this long.
 const BATCH_MAX: Duration = Duration::from_millis(500);
 
+/// A file that is written to and not closed is taken to be unfinished for this long after the last byte.
+pub(crate) const UNFINISHED: Duration = Duration::from_secs(1);
+
 /// Files of the project that changed together.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Batch {
@@ -43,12 +46,16 @@ impl Batch {
 /// Path, as named and as links lead to it, to the names that it has in the project.
 pub(crate) type Relevant = BTreeMap<PathBuf, BTreeSet<String>>;
 
+/// Files that are open for writing, as far as the system tells, and when the last byte was seen.
+type Writing = Arc<Mutex<BTreeMap<String, Instant>>>;
+
 /// Watches a project's folder, and the folders of sources that lie elsewhere.
 pub(crate) struct Watch {
     watcher: RecommendedWatcher,
     folder: PathBuf,
     /// What the last plan looked at.
     relevant: Arc<Mutex<Relevant>>,
+    writing: Writing,
     outside: BTreeSet<PathBuf>,
     /// Whether a source is a link, or lies outside the folder.
     has_links: bool,
@@ -64,12 +71,26 @@ impl Watch {
         })?;
         watcher.watch(folder, RecursiveMode::Recursive)?;
         let relevant = Arc::new(Mutex::new(BTreeMap::new()));
+        let writing = Writing::default();
         let (folder_of_thread, relevant_of_thread) = (folder.to_owned(), relevant.clone());
+        let writing_of_thread = writing.clone();
         std::thread::spawn(move || {
-            let name = |event: &_| name_changes(event, &folder_of_thread, &relevant_of_thread);
+            let name = |event: &_| {
+                let names = name_changes(event, &folder_of_thread, &relevant_of_thread);
+                note_writing(event.as_ref().ok(), &names, &writing_of_thread);
+                names
+            };
             settle(&events, &settled, name, |event| ends_a_save(event.as_ref()));
         });
-        Ok(Watch { watcher, folder: folder.to_owned(), relevant, outside: BTreeSet::new(), has_links: false })
+        let (folder, outside) = (folder.to_owned(), BTreeSet::new());
+        Ok(Watch { watcher, folder, relevant, writing, outside, has_links: false })
+    }
+
+    /// Files that somebody is in the middle of writing: what is wrong with them may not be wrong when they are whole.
+    pub(crate) fn being_written(&self) -> BTreeSet<String> {
+        let mut writing = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
+        writing.retain(|_, last| last.elapsed() < UNFINISHED);
+        writing.keys().cloned().collect()
     }
 
     /// Whether [`Watch::set_relevant`] depends on more than the sources' names.
@@ -168,6 +189,20 @@ pub(crate) fn name_changes(
         names.extend(below.flat_map(|(_, names)| names.clone()));
     }
     names
+}
+
+/// Keeps account of who writes: bytes begin it, closing, moving or removing the file ends it.
+fn note_writing(event: Option<&notify::Event>, names: &BTreeSet<String>, writing: &Writing) {
+    use notify::event::ModifyKind;
+    let mut writing = writing.lock().unwrap_or_else(PoisonError::into_inner);
+    match event.map(|event| event.kind) {
+        Some(EventKind::Modify(ModifyKind::Data(_))) => {
+            writing.extend(names.iter().map(|name| (name.clone(), Instant::now())));
+        }
+        // The mode or the owner says nothing of bytes to come.
+        Some(EventKind::Modify(ModifyKind::Metadata(_)) | EventKind::Create(_)) => {}
+        _ => names.iter().for_each(|name| _ = writing.remove(name)),
+    }
 }
 
 /// Whether a file is whole with this event: whoever wrote it closed it, or moved it to its place.

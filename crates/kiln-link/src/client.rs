@@ -5,12 +5,14 @@ use std::net::Shutdown;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use crate::session::ClientSession;
 use crate::wire::Message as _;
-use crate::{ClientMessage, Decoder, FrameReport, PROTOCOL_VERSION, Revision, ServerMessage, transport};
+use crate::{
+    ClientMessage, Decoder, FrameReport, Hello, Revision, ServerMessage, Wants, capability, transport,
+};
 
 /// How long a client waits before it looks for a daemon again.
 const RETRY: Duration = Duration::from_millis(200);
@@ -66,13 +68,34 @@ impl Client {
         &self.events
     }
 
+    /// Tells the daemon which targets are shown (names, or groups as `env/sky`); they come first. Holds for later
+    /// connections too.
+    pub fn want(&self, targets: Vec<String>) {
+        let mut writer = self.lock_writer();
+        writer.wants = Wants { targets };
+        writer.send_wants();
+    }
+
+    /// Asks the daemon for a sign of life; [`Client::round_trip`] says how long it took.
+    pub fn ping(&self) {
+        let mut writer = self.lock_writer();
+        let number = writer.pinged.map_or(1, |(number, _)| number + 1);
+        writer.pinged = Some((number, Instant::now()));
+        writer.send(&ClientMessage::Ping(number));
+    }
+
+    /// How long the daemon's answer to the newest answered ping took.
+    pub fn round_trip(&self) -> Option<Duration> {
+        self.lock_writer().round_trip
+    }
+
     /// Tells the daemon when a revision was seen; without a connection it is lost, and nothing depends on it.
     pub fn report_frame(&self, report: FrameReport) {
-        let mut writer = self.writer.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(stream) = writer.stream.as_mut() {
-            // A broken stream is found and reported by the reading side.
-            let _ = stream.write_all(&ClientMessage::Frame(report).encode());
-        }
+        self.lock_writer().send(&ClientMessage::Frame(report));
+    }
+
+    fn lock_writer(&self) -> MutexGuard<'_, Writer> {
+        self.writer.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -99,6 +122,29 @@ struct Writer {
     stream: Option<UnixStream>,
     /// The client is being dropped: no stream may be stored any more, because nobody would shut it down.
     is_closed: bool,
+    wants: Wants,
+    pinged: Option<(u64, Instant)>,
+    round_trip: Option<Duration>,
+}
+
+impl Writer {
+    /// Without a connection it is lost.
+    fn send(&mut self, message: &ClientMessage) {
+        if let Some(stream) = &mut self.stream {
+            // A broken stream is found and reported by the reading side.
+            let _ = stream.write_all(&message.encode());
+        }
+    }
+
+    fn send_wants(&mut self) {
+        self.send(&ClientMessage::Wants(self.wants.clone()));
+    }
+
+    fn take_pong(&mut self, number: u64) {
+        if let Some((_, sent)) = self.pinged.filter(|(pinged, _)| *pinged == number) {
+            self.round_trip = Some(sent.elapsed());
+        }
+    }
 }
 
 struct Talk {
@@ -134,13 +180,16 @@ impl Talk {
     fn open(&self) -> std::io::Result<UnixStream> {
         let mut stream = UnixStream::connect(&self.socket)?;
         transport::check_peer(&stream)?;
-        let hello = ClientMessage::Hello { protocol: PROTOCOL_VERSION, name: self.name.clone() };
+        let hello = ClientMessage::Hello(Hello::new(&self.name, &[capability::REVISIONS]));
         stream.write_all(&hello.encode())?;
         let mut writer = self.writer.lock().unwrap_or_else(PoisonError::into_inner);
         if writer.is_closed {
             return Err(std::io::Error::other("the client has ended"));
         }
         writer.stream = Some(stream.try_clone()?);
+        if !writer.wants.targets.is_empty() {
+            writer.send_wants();
+        }
         Ok(stream)
     }
 
@@ -168,6 +217,9 @@ impl Talk {
         {
             let reaction = session.receive(message)?;
             let mut writer = self.writer.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some(number) = reaction.pong {
+                writer.take_pong(number);
+            }
             for message in reaction.send {
                 let stream = writer.stream.as_mut().ok_or("the connection is closing")?;
                 stream.write_all(&message.encode()).map_err(|error| error.to_string())?;

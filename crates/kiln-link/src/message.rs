@@ -3,37 +3,43 @@
 use kiln_build::Digest;
 use serde::{Deserialize, Serialize};
 
-use crate::RevisionTable;
+use crate::{DaemonStatus, RevisionTable};
 
 /// Raised whenever an old peer would misunderstand a new one; both sides must have the same.
-pub const PROTOCOL_VERSION: u32 = 1;
+pub const PROTOCOL_VERSION: u32 = 2;
+
+/// What a client may be capable of.
+pub mod capability {
+    /// It follows revisions: the daemon tells it tables and progress. Without it a client only asks.
+    pub const REVISIONS: &str = "revisions";
+}
 
 /// What a client says.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ClientMessage {
     /// First message.
-    Hello {
-        /// [`PROTOCOL_VERSION`] of the client.
-        protocol: u32,
-        /// For status lines: `preview`, `demo` …
-        name: String,
-    },
+    Hello(Hello),
     /// Asks for contents.
     Fetch(Vec<Digest>),
     /// Says when a revision was seen.
     Frame(FrameReport),
+    /// Says what it shows; replaces what it said before.
+    Wants(Wants),
+    /// Asks whether the daemon is there; the daemon answers with the same number.
+    Ping(u64),
+    /// The answer to a ping.
+    Pong(u64),
+    /// Asks for a [`DaemonStatus`].
+    Status,
+    /// Asks the daemon to end.
+    Stop,
 }
 
 /// What a daemon says.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ServerMessage {
-    /// First message.
-    Hello {
-        /// [`PROTOCOL_VERSION`] of the daemon.
-        protocol: u32,
-        /// Name of the project.
-        project: String,
-    },
+    /// First message; the name is the project's.
+    Hello(Hello),
     /// A new state of the project.
     Revision(RevisionTable),
     /// A piece of a content.
@@ -47,10 +53,58 @@ pub enum ServerMessage {
         /// The piece.
         bytes: Vec<u8>,
     },
-    /// The daemon no longer has this content; a newer revision does without it.
+    /// A content that was asked for will not come: no table told this client of it, a newer one does without it, or
+    /// the daemon no longer has it and publishes anew.
     Missing(Digest),
     /// How far a build is.
     Progress(ProgressReport),
+    /// Asks whether the client is there; the client answers with the same number.
+    Ping(u64),
+    /// The answer to a ping.
+    Pong(u64),
+    /// How the daemon is.
+    Status(Box<DaemonStatus>),
+}
+
+/// How a talk begins.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Hello {
+    /// [`PROTOCOL_VERSION`] of who says it.
+    pub protocol: u32,
+    /// Of a client for status lines, as `preview`; of a daemon the project's.
+    pub name: String,
+    /// What it can do ([`capability`]); unknown ones are passed over, so that new ones need no new version.
+    #[serde(default)]
+    pub capabilities: Vec<String>,
+}
+
+impl Hello {
+    /// A greeting of this version.
+    pub fn new(name: &str, capabilities: &[&str]) -> Hello {
+        let capabilities = capabilities.iter().map(|&name| name.to_owned()).collect();
+        Hello { protocol: PROTOCOL_VERSION, name: name.to_owned(), capabilities }
+    }
+
+    /// Whether it has a capability.
+    pub fn can(&self, capability: &str) -> bool {
+        self.capabilities.iter().any(|name| name == capability)
+    }
+}
+
+/// What a client shows.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Wants {
+    /// Names of targets, or of groups of them: `scene/balls`, `env/sky`.
+    pub targets: Vec<String>,
+}
+
+impl Wants {
+    /// Whether the target is one of these, or lies in a group of them: `env/sky` has `env/sky/specular`, but not `env/skyline`.
+    pub fn include(&self, target: &str) -> bool {
+        self.targets.iter().any(|want| {
+            target.strip_prefix(want.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+        })
+    }
 }
 
 /// How far a build is.

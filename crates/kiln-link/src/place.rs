@@ -4,8 +4,13 @@ use std::fs;
 use std::io::{Read as _, Seek as _, Write as _};
 use std::os::unix::fs::{DirBuilderExt as _, MetadataExt as _, OpenOptionsExt as _};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use kiln_build::Digest;
+use rustix::fs::FlockOperation;
+
+/// A daemon that is just ending, or somebody who looks whether it has, is waited for as long as this.
+const GOING: Duration = Duration::from_millis(100);
 
 /// The socket of the project in `folder` (canonical): a hashed name in a folder that only this user can enter.
 ///
@@ -46,7 +51,9 @@ pub struct ProjectLock {
 #[derive(Debug, thiserror::Error)]
 pub enum LockError {
     /// Another daemon serves it.
-    #[error("process {pid} already watches this project; connect to it with `kiln preview`, or end it first")]
+    #[error(
+        "process {pid} already watches this project; connect to it with `kiln preview`, or end it with `kiln stop`"
+    )]
     Held {
         /// The other daemon.
         pid: String,
@@ -69,7 +76,7 @@ impl ProjectLock {
         let mut options = fs::OpenOptions::new();
         options.read(true).write(true).create(true).truncate(false).mode(0o600);
         let mut file = options.open(&path).map_err(io)?;
-        match rustix::fs::flock(&file, rustix::fs::FlockOperation::NonBlockingLockExclusive) {
+        match flock_soon(&file, FlockOperation::NonBlockingLockExclusive, Instant::now() + GOING) {
             Ok(()) => {}
             Err(rustix::io::Errno::WOULDBLOCK) => {
                 let mut pid = String::new();
@@ -81,5 +88,25 @@ impl ProjectLock {
         file.set_len(0).and_then(|()| file.rewind()).map_err(io)?;
         writeln!(file, "{}", std::process::id()).map_err(io)?;
         Ok(ProjectLock { _file: file })
+    }
+
+    /// Waits until nobody holds the lock beside `socket`; says whether that came about in time.
+    pub(crate) fn wait_until_free(socket: &Path, deadline: Instant) -> bool {
+        match fs::File::open(socket.with_extension("lock")) {
+            Ok(file) => flock_soon(&file, FlockOperation::NonBlockingLockShared, deadline).is_ok(),
+            Err(error) => error.kind() == std::io::ErrorKind::NotFound,
+        }
+    }
+}
+
+/// Tries again until the deadline: `flock` itself knows none.
+fn flock_soon(file: &fs::File, operation: FlockOperation, deadline: Instant) -> rustix::io::Result<()> {
+    loop {
+        match rustix::fs::flock(file, operation) {
+            Err(rustix::io::Errno::WOULDBLOCK) if Instant::now() < deadline => {
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            result => return result,
+        }
     }
 }

@@ -3,31 +3,33 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::{Read as _, Write as _};
-use std::net::Shutdown;
 use std::os::unix::fs::PermissionsExt as _;
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use kiln_build::Digest;
+use kiln_build::{Digest, TargetState};
 
-use crate::wire::{CHUNK_BYTES, FETCH_DIGESTS_MAX, Message as _};
+use crate::outbox::Outbox;
+use crate::wire::{FETCH_DIGESTS_MAX, Message as _};
 use crate::{
-    ClientMessage, Decoder, FrameReport, PROTOCOL_VERSION, ProgressReport, RevisionTable, ServerMessage,
-    transport,
+    BuildStatus, ClientMessage, ClientStatus, DaemonStatus, Decoder, FrameReport, Hello, PROTOCOL_VERSION,
+    ProgressReport, RevisionTable, ServerMessage, capability, transport,
 };
 
-/// Clients at once.
-const CLIENTS_MAX: usize = 64;
+/// Connections at once.
+const CONNECTIONS_MAX: usize = 64;
 /// A client that takes no byte for this long is let go.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
+/// Who connects has this long to say who it is.
+const GREETING_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Where contents come from.
 pub type BlobSource = dyn Fn(&Digest) -> Option<Arc<[u8]>> + Send + Sync;
 
-/// What clients do, as the daemon sees it.
+/// What clients do, as the daemon sees it. Who only asks for the status is no client.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ServerEvent {
     /// A client greeted.
@@ -44,13 +46,15 @@ pub enum ServerEvent {
         /// Why.
         reason: String,
     },
-    /// A client saw a revision.
+    /// A client saw a revision: one that it was told of, and each but once.
     Frame {
         /// Which.
         client: u64,
         /// When.
         report: FrameReport,
     },
+    /// Somebody asked the daemon to end.
+    StopAsked,
 }
 
 /// A listening socket and its clients.
@@ -61,27 +65,14 @@ pub struct Server {
 
 struct Shared {
     project: String,
+    since_unix_ms: f64,
     blobs: Box<BlobSource>,
     events: Box<dyn Fn(ServerEvent) + Send + Sync>,
+    connections: AtomicUsize,
     clients: Mutex<BTreeMap<u64, Arc<Outbox>>>,
     latest: Mutex<Option<Arc<RevisionTable>>>,
+    building: Mutex<Option<BuildStatus>>,
     stopping: AtomicBool,
-}
-
-/// What one client still has to be told: at most one table, one progress line and a set of digests, so its
-/// size has a bound whatever the client does.
-struct Outbox {
-    state: Mutex<OutboxState>,
-    changed: Condvar,
-    stream: UnixStream,
-}
-
-#[derive(Default)]
-struct OutboxState {
-    table: Option<Arc<RevisionTable>>,
-    progress: Option<ProgressReport>,
-    fetches: BTreeSet<Digest>,
-    closed: bool,
 }
 
 impl Server {
@@ -101,10 +92,13 @@ impl Server {
         fs::set_permissions(socket, fs::Permissions::from_mode(0o600))?;
         let shared = Arc::new(Shared {
             project: project.to_owned(),
+            since_unix_ms: unix_ms(),
             blobs,
             events,
+            connections: AtomicUsize::new(0),
             clients: Mutex::default(),
             latest: Mutex::default(),
+            building: Mutex::default(),
             stopping: AtomicBool::new(false),
         });
         let accepting = shared.clone();
@@ -115,15 +109,39 @@ impl Server {
     /// Makes `table` what every client sees; a client that has not taken the one before never gets it.
     pub fn publish(&self, table: Arc<RevisionTable>) {
         *lock(&self.shared.latest) = Some(table.clone());
-        for outbox in lock(&self.shared.clients).values() {
-            outbox.update(|state| state.table = Some(table.clone()));
-        }
+        self.tell_followers(|outbox| outbox.update(|state| state.table = Some(table.clone())));
+    }
+
+    /// Says for [`DaemonStatus`] which files' change is being built; `None` when nothing is.
+    pub fn set_building(&self, files: Option<Vec<String>>) {
+        let status = |files| BuildStatus { files, progress: ProgressReport::default() };
+        *lock(&self.shared.building) = files.map(status);
     }
 
     /// Tells every client how far a build is.
     pub fn report_progress(&self, progress: &ProgressReport) {
+        if let Some(building) = &mut *lock(&self.shared.building) {
+            building.progress = progress.clone();
+        }
+        self.tell_followers(|outbox| outbox.update(|state| state.progress = Some(progress.clone())));
+    }
+
+    /// How this daemon is.
+    pub fn status(&self) -> DaemonStatus {
+        self.shared.status()
+    }
+
+    /// What the clients show, as far as they said.
+    pub fn wanted(&self) -> BTreeSet<String> {
+        let wants = |outbox: &Arc<Outbox>| outbox.state().queue.wants().targets.clone();
+        lock(&self.shared.clients).values().flat_map(wants).collect()
+    }
+
+    fn tell_followers(&self, tell: impl Fn(&Outbox)) {
         for outbox in lock(&self.shared.clients).values() {
-            outbox.update(|state| state.progress = Some(progress.clone()));
+            if outbox.state().follows {
+                tell(outbox);
+            }
         }
     }
 }
@@ -133,11 +151,40 @@ impl Drop for Server {
         self.shared.stopping.store(true, Ordering::SeqCst);
         // Wakes the accepting thread; if nobody accepts any more there is nothing to wake.
         let _ = UnixStream::connect(&self.socket);
+        // Gone already if somebody cleaned the runtime folder. Before clients hear of the end, so that it is true.
+        let _ = fs::remove_file(&self.socket);
         for outbox in lock(&self.shared.clients).values() {
             outbox.close();
         }
-        // Gone already if somebody cleaned the runtime folder.
-        let _ = fs::remove_file(&self.socket);
+    }
+}
+
+impl Shared {
+    fn status(&self) -> DaemonStatus {
+        let status = DaemonStatus {
+            project: self.project.clone(),
+            pid: std::process::id(),
+            since_unix_ms: self.since_unix_ms,
+            building: lock(&self.building).clone(),
+            clients: self.client_statuses(),
+            ..DaemonStatus::default()
+        };
+        let Some(table) = lock(&self.latest).clone() else { return status };
+        let is_stale = |name: &&String| table.targets[*name].state == TargetState::Stale;
+        DaemonStatus {
+            revision: table.number,
+            published_unix_ms: table.work.published_unix_ms,
+            targets: table.targets.len(),
+            stale: table.targets.keys().filter(is_stale).cloned().collect(),
+            errors: table.diagnostics.iter().filter(|diagnostic| diagnostic.is_error()).cloned().collect(),
+            ..status
+        }
+    }
+
+    fn client_statuses(&self) -> Vec<ClientStatus> {
+        let clients = lock(&self.clients);
+        let states = clients.values().map(|outbox| outbox.state());
+        states.filter(|state| state.follows).map(|state| state.client_status()).collect()
     }
 }
 
@@ -145,17 +192,8 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl Outbox {
-    fn update(&self, change: impl FnOnce(&mut OutboxState)) {
-        change(&mut lock(&self.state));
-        self.changed.notify_one();
-    }
-
-    fn close(&self) {
-        self.update(|state| state.closed = true);
-        // Wakes the reading thread; the stream may be broken already.
-        let _ = self.stream.shutdown(Shutdown::Both);
-    }
+fn unix_ms() -> f64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64() * 1e3
 }
 
 fn accept(listener: &UnixListener, shared: &Arc<Shared>) {
@@ -165,18 +203,24 @@ fn accept(listener: &UnixListener, shared: &Arc<Shared>) {
             return;
         }
         let Ok(stream) = stream else { continue };
-        let full = lock(&shared.clients).len() >= CLIENTS_MAX;
+        let full = shared.connections.load(Ordering::SeqCst) >= CONNECTIONS_MAX;
         if full || transport::check_peer(&stream).is_err() {
             continue;
         }
         let (shared, client) = (shared.clone(), next_client);
         next_client += 1;
+        shared.connections.fetch_add(1, Ordering::SeqCst);
         std::thread::spawn(move || {
             let reason = serve(&shared, client, stream).unwrap_or_else(|reason| reason);
-            if let Some(outbox) = lock(&shared.clients).remove(&client) {
+            let outbox = lock(&shared.clients).remove(&client);
+            let is_client = outbox.as_ref().is_none_or(|outbox| outbox.state().follows);
+            if let Some(outbox) = outbox {
                 outbox.close();
             }
-            (shared.events)(ServerEvent::Gone { client, reason });
+            shared.connections.fetch_sub(1, Ordering::SeqCst);
+            if is_client {
+                (shared.events)(ServerEvent::Gone { client, reason });
+            }
         });
     }
 }
@@ -185,36 +229,28 @@ fn accept(listener: &UnixListener, shared: &Arc<Shared>) {
 fn serve(shared: &Arc<Shared>, client: u64, stream: UnixStream) -> Result<String, String> {
     let text = |error: std::io::Error| error.to_string();
     stream.set_write_timeout(Some(WRITE_TIMEOUT)).map_err(text)?;
-    let outbox = Arc::new(Outbox {
-        state: Mutex::default(),
-        changed: Condvar::new(),
-        stream: stream.try_clone().map_err(text)?,
-    });
+    stream.set_read_timeout(Some(GREETING_TIMEOUT)).map_err(text)?;
+    let outbox = Arc::new(Outbox::new(stream.try_clone().map_err(text)?));
     let mut reader = stream.try_clone().map_err(text)?;
     let mut decoder = Decoder::default();
     let mut buffer = vec![0; 64 << 10];
     let mut writer = Some(stream);
     loop {
-        match reader.read(&mut buffer).map_err(text)? {
-            0 => return Ok("it closed the connection".to_owned()),
-            count => decoder.push(&buffer[..count]),
+        match reader.read(&mut buffer) {
+            Ok(0) => return Ok("it closed the connection".to_owned()),
+            Ok(count) => decoder.push(&buffer[..count]),
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => continue,
+            Err(_) if writer.is_some() => return Err("it did not greet in time".to_owned()),
+            Err(error) => return Err(text(error)),
         }
         while let Some(message) =
             decoder.next_message::<ClientMessage>().map_err(|error| error.to_string())?
         {
-            match message {
-                ClientMessage::Hello { protocol, name } => {
-                    let Some(stream) = writer.take() else { return Err("it greeted twice".to_owned()) };
-                    greet(shared, client, &outbox, stream, protocol, name)?;
-                }
-                _ if writer.is_some() => return Err("it did not begin with a greeting".to_owned()),
-                ClientMessage::Fetch(digests) => {
-                    outbox.update(|state| state.fetches.extend(digests));
-                    if lock(&outbox.state).fetches.len() > FETCH_DIGESTS_MAX {
-                        return Err("it asked for more than a revision holds".to_owned());
-                    }
-                }
-                ClientMessage::Frame(report) => (shared.events)(ServerEvent::Frame { client, report }),
+            match (message, writer.take()) {
+                (ClientMessage::Hello(hello), Some(stream)) => greet(shared, client, &outbox, stream, hello)?,
+                (ClientMessage::Hello(_), None) => return Err("it greeted twice".to_owned()),
+                (_, Some(_)) => return Err("it did not begin with a greeting".to_owned()),
+                (message, None) => receive(shared, client, &outbox, message)?,
             }
         }
     }
@@ -225,71 +261,73 @@ fn greet(
     client: u64,
     outbox: &Arc<Outbox>,
     mut stream: UnixStream,
-    protocol: u32,
-    name: String,
+    hello: Hello,
 ) -> Result<(), String> {
-    let hello = ServerMessage::Hello { protocol: PROTOCOL_VERSION, project: shared.project.clone() };
-    stream.write_all(&hello.encode()).map_err(|error| error.to_string())?;
-    if protocol != PROTOCOL_VERSION {
-        return Err(format!("it speaks protocol {protocol}, this daemon {PROTOCOL_VERSION}"));
+    let answer = ServerMessage::Hello(Hello::new(&shared.project, &[capability::REVISIONS]));
+    stream.write_all(&answer.encode()).map_err(|error| error.to_string())?;
+    if hello.protocol != PROTOCOL_VERSION {
+        return Err(format!("it speaks protocol {}, this daemon {PROTOCOL_VERSION}", hello.protocol));
     }
+    stream.set_read_timeout(None).map_err(|error| error.to_string())?;
+    let follows = hello.can(capability::REVISIONS);
+    outbox.update(|state| {
+        state.follows = follows;
+        state.facts.client = client;
+        state.facts.name.clone_from(&hello.name);
+        state.facts.since_unix_ms = unix_ms();
+    });
     // Registered before the latest table is read, so that no revision falls between the two.
     lock(&shared.clients).insert(client, outbox.clone());
-    if let Some(table) = lock(&shared.latest).clone() {
-        outbox.update(|state| _ = state.table.get_or_insert(table));
+    if follows {
+        if let Some(table) = lock(&shared.latest).clone() {
+            outbox.update(|state| _ = state.table.get_or_insert(table));
+        }
+        (shared.events)(ServerEvent::Connected { client, name: hello.name });
     }
-    (shared.events)(ServerEvent::Connected { client, name });
     let (shared, outbox) = (shared.clone(), outbox.clone());
     std::thread::spawn(move || {
-        if write_all(&shared, &outbox, stream).is_err() {
+        if outbox.write_all(&*shared.blobs, stream).is_err() {
             outbox.close();
         }
     });
     Ok(())
 }
 
-/// Writes what the outbox holds, most urgent first, until it closes.
-fn write_all(shared: &Shared, outbox: &Outbox, mut stream: UnixStream) -> std::io::Result<()> {
-    let mut current: Option<(Digest, Arc<[u8]>, usize)> = None;
-    loop {
-        let mut state = lock(&outbox.state);
-        while !state.closed
-            && state.table.is_none()
-            && state.progress.is_none()
-            && current.is_none()
-            && state.fetches.is_empty()
-        {
-            state = outbox.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
-        }
-        if state.closed {
-            return Ok(());
-        }
-        let table = state.table.take();
-        let progress = state.progress.take();
-        let fetch = if current.is_none() { state.fetches.pop_first() } else { None };
-        drop(state);
-        if let Some(table) = table {
-            stream.write_all(&ServerMessage::Revision((*table).clone()).encode())?;
-        }
-        if let Some(progress) = progress {
-            stream.write_all(&ServerMessage::Progress(progress).encode())?;
-        }
-        if let Some(digest) = fetch {
-            match (shared.blobs)(&digest) {
-                Some(bytes) => current = Some((digest, bytes, 0)),
-                None => stream.write_all(&ServerMessage::Missing(digest).encode())?,
+/// Takes a message of a client that has greeted.
+fn receive(shared: &Shared, client: u64, outbox: &Outbox, message: ClientMessage) -> Result<(), String> {
+    match message {
+        ClientMessage::Hello(_) => {}
+        ClientMessage::Fetch(digests) => {
+            outbox.update(|state| state.queue.fetch(digests));
+            if outbox.state().queue.len() > FETCH_DIGESTS_MAX {
+                return Err("it asked for more than a revision holds".to_owned());
             }
         }
-        if let Some((digest, bytes, offset)) = current.take() {
-            let end = bytes.len().min(offset + CHUNK_BYTES);
-            let chunk = ServerMessage::Chunk {
-                digest,
-                offset: offset as u64,
-                total: bytes.len() as u64,
-                bytes: bytes[offset..end].to_vec(),
-            };
-            stream.write_all(&chunk.encode())?;
-            current = (end < bytes.len()).then_some((digest, bytes, end));
+        ClientMessage::Frame(report) => take_frame(shared, client, outbox, report),
+        ClientMessage::Wants(wants) => outbox.update(|state| state.queue.set_wants(wants)),
+        ClientMessage::Ping(number) => outbox.update(|state| state.pong = Some(number)),
+        ClientMessage::Pong(number) => outbox.state().take_pong(number),
+        ClientMessage::Status => {
+            let status = shared.status();
+            outbox.update(|state| state.status = Some(Box::new(status)));
         }
+        ClientMessage::Stop => (shared.events)(ServerEvent::StopAsked),
     }
+    Ok(())
+}
+
+/// A report counts once for each revision, so that a client cannot flood the daemon with them.
+fn take_frame(shared: &Shared, client: u64, outbox: &Outbox, report: FrameReport) {
+    let latest = lock(&shared.latest).clone();
+    let mut state = outbox.state();
+    let facts = &mut state.facts;
+    if report.revision <= facts.shown_revision || report.revision > facts.told_revision {
+        return;
+    }
+    facts.shown_revision = report.revision;
+    facts.shown_after_ms = latest
+        .filter(|table| table.number == report.revision)
+        .map(|table| report.drawn_unix_ms - table.work.published_unix_ms);
+    drop(state);
+    (shared.events)(ServerEvent::Frame { client, report });
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use kiln_build::Digest;
 
-use crate::{ClientEvent, ClientMessage, PROTOCOL_VERSION, Revision, RevisionTable, ServerMessage};
+use crate::{ClientEvent, ClientMessage, Hello, PROTOCOL_VERSION, Revision, RevisionTable, ServerMessage};
 
 /// Turns what the daemon says into requests and whole revisions. Contents survive a reconnection, so that a
 /// client that has everything fetches nothing.
@@ -16,6 +16,8 @@ pub(crate) struct ClientSession {
     arriving: HashMap<Digest, Vec<u8>>,
     requested: HashSet<Digest>,
     pending: Option<RevisionTable>,
+    /// Contents of the newest whole revision.
+    delivered: HashSet<Digest>,
 }
 
 /// What to do after a message.
@@ -23,6 +25,8 @@ pub(crate) struct ClientSession {
 pub(crate) struct Reaction {
     pub(crate) send: Vec<ClientMessage>,
     pub(crate) events: Vec<ClientEvent>,
+    /// The daemon answered the ping of this number.
+    pub(crate) pong: Option<u64>,
 }
 
 impl ClientSession {
@@ -41,7 +45,7 @@ impl ClientSession {
     pub(crate) fn receive(&mut self, message: ServerMessage) -> Result<Reaction, String> {
         let mut reaction = Reaction::default();
         match message {
-            ServerMessage::Hello { protocol, project } => {
+            ServerMessage::Hello(Hello { protocol, name: project, .. }) => {
                 if protocol != PROTOCOL_VERSION {
                     return Err(format!(
                         "the daemon speaks protocol {protocol}, this client {PROTOCOL_VERSION}: update the older one"
@@ -52,6 +56,8 @@ impl ClientSession {
             }
             _ if !self.greeted => return Err("the daemon did not begin with a greeting".to_owned()),
             ServerMessage::Revision(table) => {
+                let wanted = digests(&table);
+                self.contents.retain(|digest, _| wanted.contains(digest) || self.delivered.contains(digest));
                 self.pending = Some(table);
                 self.request_missing(&mut reaction);
                 self.commit_if_whole(&mut reaction);
@@ -60,19 +66,21 @@ impl ClientSession {
                 self.take_chunk(digest, offset, total, &bytes)?;
                 self.commit_if_whole(&mut reaction);
             }
-            // The daemon makes it anew and publishes again; a pending revision that names it cannot become whole.
+            // A newer revision does without it: a pending one that names it cannot become whole.
             ServerMessage::Missing(digest) => {
                 self.requested.remove(&digest);
-                let names = |table: &RevisionTable| {
-                    table.targets.values().flat_map(|target| &target.parts).any(|part| part.digest == digest)
-                };
-                self.pending = self.pending.take().filter(|table| !names(table));
+                self.arriving.remove(&digest);
+                self.pending = self.pending.take().filter(|table| !digests(table).contains(&digest));
             }
             ServerMessage::Progress(progress) => reaction.events.push(ClientEvent::Progress {
                 done: progress.done,
                 total: progress.total,
                 current: progress.current,
             }),
+            ServerMessage::Ping(number) => reaction.send.push(ClientMessage::Pong(number)),
+            ServerMessage::Pong(number) => reaction.pong = Some(number),
+            // Nobody asked here.
+            ServerMessage::Status(_) => {}
         }
         Ok(reaction)
     }
@@ -116,15 +124,19 @@ impl ClientSession {
 
     fn commit_if_whole(&mut self, reaction: &mut Reaction) {
         let Some(table) = &self.pending else { return };
-        let parts = table.targets.values().flat_map(|target| &target.parts);
-        let wanted: HashSet<Digest> = parts.map(|part| part.digest).collect();
+        let wanted = digests(table);
         if !wanted.iter().all(|digest| self.contents.contains_key(digest)) {
             return;
         }
         self.contents.retain(|digest, _| wanted.contains(digest));
+        self.delivered = wanted;
         let Some(table) = self.pending.take() else { return };
         if let Ok(revision) = Revision::new(table, self.contents.clone()) {
             reaction.events.push(ClientEvent::Revision(Arc::new(revision)));
         }
     }
+}
+
+fn digests(table: &RevisionTable) -> HashSet<Digest> {
+    table.targets.values().flat_map(|target| &target.parts).map(|part| part.digest).collect()
 }

@@ -52,6 +52,10 @@ pub(crate) enum Command {
     Doctor(DoctorArgs),
     /// Bake, then follow every edit and publish it to connected previews
     Watch(WatchArgs),
+    /// Say whether a project is watched, what is published and building, and what its clients show; exit code 1 if it is not
+    Status(StatusArgs),
+    /// End the `kiln watch` of a project and wait until it is gone; exit code 0 too if there is none
+    Stop(StopArgs),
     /// Show what a watching kiln publishes, in a window or as PNG files
     #[cfg(feature = "preview")]
     Preview(PreviewArgs),
@@ -360,6 +364,26 @@ pub(crate) struct WatchArgs {
     /// Do not write baked files, only publish to previews
     #[arg(long)]
     pub(crate) no_output: bool,
+    /// Also look at the files themselves this often, as 500ms or 2s: for file systems that tell of no change (a network's)
+    #[arg(long, value_name = "TIME", value_parser = parse_poll)]
+    pub(crate) poll: Option<std::time::Duration>,
+}
+
+#[derive(Debug, ClapArgs)]
+pub(crate) struct StatusArgs {
+    /// The project's folder
+    #[arg(default_value = ".")]
+    pub(crate) dir: PathBuf,
+    /// Print JSON instead of text
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, ClapArgs)]
+pub(crate) struct StopArgs {
+    /// The project's folder
+    #[arg(default_value = ".")]
+    pub(crate) dir: PathBuf,
 }
 
 #[cfg(feature = "preview")]
@@ -505,6 +529,16 @@ pub(crate) struct DemoArgs {
 
 fn parse_bytes(text: &str) -> Result<u64, String> {
     kiln_project::parse_bytes(text).ok_or_else(|| format!("`{text}` is no size; write it as 2GiB or 500MB"))
+}
+
+fn parse_poll(text: &str) -> Result<std::time::Duration, String> {
+    let wrong = || format!("`{text}` is no time to poll at; write it as 500ms or 2s, from 50ms to 1h");
+    let (number, unit_ms) = match text.strip_suffix("ms") {
+        Some(number) => (number, 1),
+        None => (text.strip_suffix('s').ok_or_else(wrong)?, 1000),
+    };
+    let ms = number.parse::<u64>().ok().and_then(|number| number.checked_mul(unit_ms)).ok_or_else(wrong)?;
+    (50..=3_600_000).contains(&ms).then(|| std::time::Duration::from_millis(ms)).ok_or_else(wrong)
 }
 
 fn parse_size(text: &str) -> Result<[u32; 2], String> {

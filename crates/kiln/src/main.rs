@@ -57,6 +57,8 @@ fn main() -> ExitCode {
         args::Command::Gc(args) => commands::gc::run(&args),
         args::Command::Doctor(args) => commands::doctor::run(&args),
         args::Command::Watch(args) => commands::watch::run(&args),
+        args::Command::Status(args) => commands::status::run(&args),
+        args::Command::Stop(args) => commands::stop::run(&args),
         #[cfg(feature = "preview")]
         args::Command::Preview(args) => commands::preview::run(&args),
         #[cfg(feature = "preview")]

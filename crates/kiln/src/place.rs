@@ -97,7 +97,6 @@ fn free_memory_bytes() -> Option<u64> {
 }
 
 /// The socket of the project in `dir`.
-#[cfg(feature = "preview")]
 pub(crate) fn socket_of(dir: &Path) -> anyhow::Result<PathBuf> {
     kiln_link::socket_path(&project_folder(dir)?).context("finding the project's socket")
 }

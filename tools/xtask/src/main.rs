@@ -39,6 +39,8 @@ cargo xtask faults [COUNT]        kill COUNT processes at random moments and fli
 cargo xtask fuzz [COUNT] [SEED]   decode COUNT damaged copies of each image file of the tests (default 100000)
 cargo xtask fuzz shaders [COUNT] [SEED]
                                   compile COUNT damaged, COUNT random WGSL and COUNT random GLSL shaders in the worker (default 10000)
+cargo xtask fuzz wire [COUNT] [SEED]
+                                  damage COUNT talks of a daemon and COUNT of a client, some over real sockets (default 100000)
 cargo xtask corpus [OUT]          bake and render the files of $KILN_CORPUS into OUT (default target/corpus)
 cargo xtask size                  build with and without the preview and compare time and size
 ";
@@ -66,6 +68,9 @@ fn main() -> ExitCode {
         ["fuzz", "shaders"] => test::fuzz_shaders(None, None),
         ["fuzz", "shaders", count] => test::fuzz_shaders(Some(count), None),
         ["fuzz", "shaders", count, seed] => test::fuzz_shaders(Some(count), Some(seed)),
+        ["fuzz", "wire"] => test::fuzz_wire(None, None),
+        ["fuzz", "wire", count] => test::fuzz_wire(Some(count), None),
+        ["fuzz", "wire", count, seed] => test::fuzz_wire(Some(count), Some(seed)),
         ["fuzz", count] => test::fuzz(Some(count), None),
         ["fuzz", count, seed] => test::fuzz(Some(count), Some(seed)),
         ["bench", edits] => match edits.parse() {

@@ -80,6 +80,18 @@ pub(crate) fn fuzz_shaders(count: Option<&str>, seed: Option<&str>) -> Result<()
     step("fuzz shaders", &mut tests)
 }
 
+/// The tests that damage what daemon and clients say to each other, likewise.
+pub(crate) fn fuzz_wire(count: Option<&str>, seed: Option<&str>) -> Result<(), String> {
+    let arguments = ["test", "--release", "-p", "kiln-link", "--lib", "--", "tests::fuzz::", "--nocapture"];
+    let mut tests = cargo(&arguments);
+    tests.env("KILN_FUZZ_COUNT", number(count.unwrap_or(MUTANTS))?);
+    match seed {
+        Some(seed) => tests.env("KILN_FUZZ_SEED", number(seed)?),
+        None => tests.env_remove("KILN_FUZZ_SEED"),
+    };
+    step("fuzz wire", &mut tests)
+}
+
 fn number(text: &str) -> Result<&str, String> {
     text.parse::<u64>().map(|_| text).map_err(|_| format!("`{text}` is no number"))
 }

@@ -82,6 +82,7 @@ impl Demo {
             memory_bytes: place::memory_bytes(None),
             cache_bytes_max: place::cache_bytes_max()?,
             write_outputs: true,
+            poll: None,
         };
         let daemon = Daemon::start(&options).context("starting the daemon")?;
         let (stop, socket) = (daemon.stop_handle(), daemon.socket().to_owned());

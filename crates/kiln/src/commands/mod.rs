@@ -17,6 +17,8 @@ pub(crate) mod preview;
 #[cfg(feature = "preview")]
 pub(crate) mod render;
 pub(crate) mod shader;
+pub(crate) mod status;
+pub(crate) mod stop;
 pub(crate) mod verify;
 pub(crate) mod watch;
 pub(crate) mod why;

@@ -21,6 +21,7 @@ pub(crate) fn run(args: &WatchArgs) -> anyhow::Result<ExitCode> {
         memory_bytes: place::memory_bytes(args.build.memory),
         cache_bytes_max: place::cache_bytes_max()?,
         write_outputs: !args.no_output,
+        poll: args.poll,
     };
     let daemon = match Daemon::start(&options) {
         Err(DaemonError::Lock(error)) => {
@@ -75,6 +76,9 @@ impl Screen {
                 report::print_diagnostics(&table.diagnostics, table.number == 1);
                 say!("  {}", report::revision_line(table));
             }
+            Notice::Unfinished { files } => {
+                say!("  {} being written; waiting for the rest", files.join(", "));
+            }
             Notice::Failed(reason) => eprintln!("  the tool failed: {reason}; what was published stays"),
             Notice::Client(event) => self.show_client(event),
         }
@@ -84,6 +88,7 @@ impl Screen {
         match event {
             ServerEvent::Connected { client, name } => say!("client {client} ({name}) connected"),
             ServerEvent::Gone { client, reason } => say!("client {client} left: {reason}"),
+            ServerEvent::StopAsked => say!("asked to end"),
             ServerEvent::Frame { client, report } => {
                 let since =
                     if self.noticed_unix_ms > 0.0 { self.noticed_unix_ms } else { self.published_unix_ms };
@@ -111,6 +116,7 @@ fn to_json(notice: &Notice) -> serde_json::Value {
                 (name.clone(), json!({"state": target.state, "sha256": target.digest(), "bytes": target.bytes()}))
             }).collect::<serde_json::Map<_, _>>(),
         }),
+        Notice::Unfinished { files } => json!({"event": "unfinished", "files": files}),
         Notice::Failed(reason) => json!({"event": "failed", "reason": reason}),
         Notice::Client(ServerEvent::Connected { client, name }) => {
             json!({"event": "client connected", "client": client, "name": name})
@@ -121,5 +127,6 @@ fn to_json(notice: &Notice) -> serde_json::Value {
         Notice::Client(ServerEvent::Frame { client, report }) => {
             json!({"event": "frame", "client": client, "report": report})
         }
+        Notice::Client(ServerEvent::StopAsked) => json!({"event": "stop asked"}),
     }
 }

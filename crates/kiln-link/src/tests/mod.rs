@@ -1,3 +1,12 @@
+//! Both halves of the wire: over real sockets, and message by message.
+
+#![expect(clippy::print_stderr, reason = "what was skipped and what a long run found is said")]
+
+mod control;
+mod fuzz;
+mod python;
+mod queue;
+
 use std::collections::{BTreeMap, HashMap};
 use std::io::{Read as _, Write as _};
 use std::os::unix::net::UnixStream;
@@ -9,7 +18,7 @@ use kiln_build::Digest;
 use serde_json::json;
 
 use crate::session::ClientSession;
-use crate::wire::{FRAME_BYTES_MAX, Message};
+use crate::wire::{Message, SERVER_FRAME_BYTES_MAX};
 use crate::*;
 
 const LIMIT: Duration = Duration::from_secs(20);
@@ -116,8 +125,9 @@ fn stuck_client_does_not_hold_up_the_others() {
     let big = vec![1; 8 << 20];
     let bench = serve(&[&big]);
     let mut stuck = UnixStream::connect(&bench.socket).unwrap();
-    let hello = ClientMessage::Hello { protocol: PROTOCOL_VERSION, name: "stuck".into() };
+    let hello = ClientMessage::Hello(Hello::new("stuck", &[capability::REVISIONS]));
     stuck.write_all(&hello.encode()).unwrap();
+    bench.server.publish(Arc::new(table(0, &[&big])));
     stuck.write_all(&ClientMessage::Fetch(vec![Digest::of(&big)]).encode()).unwrap();
     assert!(matches!(bench.events.recv_timeout(LIMIT).unwrap(), ServerEvent::Connected { .. }));
     let client = Client::connect(bench.socket.clone(), "quick");
@@ -131,7 +141,7 @@ fn stuck_client_does_not_hold_up_the_others() {
 fn peer_of_another_version_is_told_so() {
     let bench = serve(&[]);
     let mut stream = UnixStream::connect(&bench.socket).unwrap();
-    let hello = ClientMessage::Hello { protocol: PROTOCOL_VERSION + 1, name: "new".into() };
+    let hello = ClientMessage::Hello(Hello { protocol: PROTOCOL_VERSION + 1, ..Hello::new("new", &[]) });
     stream.write_all(&hello.encode()).unwrap();
     let mut answer = Vec::new();
     stream.set_read_timeout(Some(LIMIT)).unwrap();
@@ -142,14 +152,14 @@ fn peer_of_another_version_is_told_so() {
     assert!(ClientSession::default().receive(message).is_ok());
     let gone = bench.events.recv_timeout(LIMIT).unwrap();
     assert!(matches!(&gone, ServerEvent::Gone { reason, .. } if reason.contains("protocol")), "{gone:?}");
-    let other = ServerMessage::Hello { protocol: PROTOCOL_VERSION + 1, project: "p".into() };
+    let other = ServerMessage::Hello(Hello { protocol: PROTOCOL_VERSION + 1, ..Hello::new("p", &[]) });
     assert!(ClientSession::default().receive(other).is_err_and(|reason| reason.contains("update")));
 }
 
 #[test]
 fn messages_survive_being_cut_anywhere() {
     let messages = [
-        ServerMessage::Hello { protocol: 1, project: "p".into() },
+        ServerMessage::Hello(Hello::new("p", &["x"])),
         ServerMessage::Revision(table(3, &[b"a", b"b"])),
         ServerMessage::Chunk { digest: Digest::of(b"a"), offset: 0, total: 1, bytes: b"a".to_vec() },
         ServerMessage::Missing(Digest::of(b"z")),
@@ -171,7 +181,7 @@ fn messages_survive_being_cut_anywhere() {
 
 #[test]
 fn hostile_frames_are_refused() {
-    let too_long = u32::try_from(FRAME_BYTES_MAX + 1).unwrap().to_le_bytes();
+    let too_long = u32::try_from(SERVER_FRAME_BYTES_MAX + 1).unwrap().to_le_bytes();
     let cases: [&[u8]; 5] = [
         &too_long,
         &[0, 0, 0, 0],
@@ -189,7 +199,7 @@ fn hostile_frames_are_refused() {
 
 fn greeted() -> ClientSession {
     let mut session = ClientSession::default();
-    session.receive(ServerMessage::Hello { protocol: PROTOCOL_VERSION, project: "p".into() }).unwrap();
+    session.receive(ServerMessage::Hello(Hello::new("p", &[]))).unwrap();
     session
 }
 
@@ -243,4 +253,41 @@ fn second_lock_names_the_holder() {
     assert!(error.to_string().contains(&std::process::id().to_string()), "{error}");
     drop(held);
     ProjectLock::take(&socket).unwrap();
+}
+
+#[test]
+fn shader_asked_for_in_the_middle_of_a_cube_comes_within_a_few_chunks() {
+    let (cube, shader) = (vec![1; 60_000_000], b"fn main() {}");
+    let bench = serve(&[&cube, shader]);
+    let mut revision = table(1, &[&cube]);
+    let compiled = Target { kind: "shader".into(), ..table(1, &[shader]).targets["env/a/specular"].clone() };
+    revision.targets.insert("shader/pbr/base".to_owned(), compiled);
+    bench.server.publish(Arc::new(revision));
+    let mut stream = UnixStream::connect(&bench.socket).unwrap();
+    stream.set_read_timeout(Some(LIMIT)).unwrap();
+    let hello = ClientMessage::Hello(Hello::new("raw", &[capability::REVISIONS]));
+    stream.write_all(&hello.encode()).unwrap();
+    let (mut decoder, mut buffer) = (Decoder::default(), vec![0; 64 << 10]);
+    let mut next = |stream: &mut UnixStream| loop {
+        if let Some(message) = decoder.next_message::<ServerMessage>().unwrap() {
+            return message;
+        }
+        let count = stream.read(&mut buffer).unwrap();
+        assert!(count > 0, "the server hung up");
+        decoder.push(&buffer[..count]);
+    };
+    while !matches!(next(&mut stream), ServerMessage::Revision(_)) {}
+    stream.write_all(&ClientMessage::Fetch(vec![Digest::of(&cube)]).encode()).unwrap();
+    while !matches!(next(&mut stream), ServerMessage::Chunk { .. }) {}
+    stream.write_all(&ClientMessage::Fetch(vec![Digest::of(shader)]).encode()).unwrap();
+    let mut overtaken_bytes = 0;
+    loop {
+        match next(&mut stream) {
+            ServerMessage::Chunk { digest, .. } if digest == Digest::of(shader) => break,
+            ServerMessage::Chunk { bytes, .. } => overtaken_bytes += bytes.len(),
+            _ => {}
+        }
+    }
+    // What was in the socket already, and a thread that the system lets wait while this one reads on.
+    assert!(overtaken_bytes < 16 << 20, "{overtaken_bytes} bytes of the cube came first");
 }

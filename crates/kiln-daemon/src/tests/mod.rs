@@ -1,3 +1,7 @@
+//! Watching by itself, and whole daemons on small projects.
+
+mod live;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -170,4 +174,110 @@ fn closed_or_moved_file_is_whole_and_a_written_one_is_not() {
     assert!(ends(EventKind::Modify(ModifyKind::Name(RenameMode::To))));
     assert!(!ends(EventKind::Modify(ModifyKind::Data(DataChange::Any))));
     assert!(!ends(EventKind::Access(AccessKind::Close(AccessMode::Read))));
+}
+
+/// Takes batches until all these files were in one.
+fn wait_for(batches: &std::sync::mpsc::Receiver<Batch>, files: &[&str]) {
+    let mut left = names(files);
+    while !left.is_empty() {
+        let batch = batches.recv_timeout(LIMIT).unwrap_or_else(|error| panic!("{left:?}: {error}"));
+        left.retain(|name| !batch.files.contains(name));
+    }
+}
+
+#[test]
+fn file_replaced_by_a_folder_and_back_is_noticed_each_time() {
+    let project = tempfile::tempdir().unwrap();
+    let project = project.path().canonicalize().unwrap();
+    let file = project.join("sky.hdr");
+    fs::write(&file, "before").unwrap();
+    let (sender, batches) = channel();
+    let mut watch = Watch::start(&project, move |batch| drop(sender.send(batch))).unwrap();
+    watch.set_relevant(&["sky.hdr".to_owned()]);
+    fs::remove_file(&file).unwrap();
+    wait_for(&batches, &["sky.hdr"]);
+    fs::create_dir(&file).unwrap();
+    wait_for(&batches, &["sky.hdr"]);
+    fs::remove_dir(&file).unwrap();
+    wait_for(&batches, &["sky.hdr"]);
+    fs::write(&file, "after").unwrap();
+    wait_for(&batches, &["sky.hdr"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn link_that_leads_elsewhere_now_is_noticed_and_followed() {
+    use std::os::unix::fs::symlink;
+    let (project, elsewhere) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let project = project.path().canonicalize().unwrap();
+    let elsewhere = elsewhere.path().canonicalize().unwrap();
+    for name in ["one", "two"] {
+        fs::create_dir(elsewhere.join(name)).unwrap();
+        fs::write(elsewhere.join(name).join("sky.hdr"), name).unwrap();
+    }
+    let link = project.join("sky.hdr");
+    symlink(elsewhere.join("one/sky.hdr"), &link).unwrap();
+    let (sender, batches) = channel();
+    let mut watch = Watch::start(&project, move |batch| drop(sender.send(batch))).unwrap();
+    watch.set_relevant(&["sky.hdr".to_owned()]);
+    assert!(watch.has_links());
+    fs::remove_file(&link).unwrap();
+    symlink(elsewhere.join("two/sky.hdr"), &link).unwrap();
+    wait_for(&batches, &["sky.hdr"]);
+    // As the daemon does after each build of a project with links.
+    watch.set_relevant(&["sky.hdr".to_owned()]);
+    while batches.try_recv().is_ok() {}
+    fs::write(elsewhere.join("two/sky.hdr"), "after").unwrap();
+    wait_for(&batches, &["sky.hdr"]);
+}
+
+#[test]
+fn checkout_of_thousands_of_files_misses_none() {
+    let project = tempfile::tempdir().unwrap();
+    let project = project.path().canonicalize().unwrap();
+    let files: Vec<String> = (0..3000).map(|index| format!("shaders/{}/{index}.wgsl", index % 50)).collect();
+    let (sender, batches) = channel();
+    let mut watch = Watch::start(&project, move |batch| drop(sender.send(batch))).unwrap();
+    watch.set_relevant(&files);
+    for file in &files {
+        fs::create_dir_all(project.join(file).parent().unwrap()).unwrap();
+        fs::write(project.join(file), "new").unwrap();
+    }
+    wait_for(&batches, &files.iter().map(String::as_str).collect::<Vec<_>>());
+}
+
+#[test]
+fn events_of_thousands_of_files_that_wait_are_one_batch() {
+    let (sender, events) = channel();
+    (0..5000).for_each(|index: u32| sender.send(index).unwrap());
+    drop(sender);
+    let batches = Mutex::new(Vec::new());
+    let name = |index: &u32| names(&[&index.to_string()]);
+    settle(&events, &|batch: Batch| batches.lock().unwrap().push(batch.files.len()), name, |_| false);
+    assert_eq!(batches.into_inner().unwrap(), [5000]);
+}
+
+#[test]
+fn file_is_being_written_from_the_first_byte_until_it_is_closed() {
+    use std::io::Write as _;
+    let project = tempfile::tempdir().unwrap();
+    let project = project.path().canonicalize().unwrap();
+    let (sender, batches) = channel();
+    let mut watch = Watch::start(&project, move |batch| drop(sender.send(batch))).unwrap();
+    watch.set_relevant(&["sky.hdr".to_owned()]);
+    let mut file = fs::File::create(project.join("sky.hdr")).unwrap();
+    file.write_all(b"half").unwrap();
+    let deadline = Instant::now() + LIMIT;
+    // Looked at again as bytes come, because the account forgets whoever stops.
+    while watch.being_written().is_empty() {
+        assert!(Instant::now() < deadline);
+        file.write_all(b".").unwrap();
+        std::thread::yield_now();
+    }
+    drop(file);
+    while !watch.being_written().is_empty() {
+        assert!(Instant::now() < deadline);
+        std::thread::yield_now();
+    }
+    wait_for(&batches, &["sky.hdr"]);
 }

@@ -1,0 +1,186 @@
+//! Whole daemons on a project of one small environment.
+
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use kiln_link::{RevisionTable, TargetState};
+
+use super::LIMIT;
+use crate::{Daemon, DaemonOptions, Notice};
+
+/// A panorama of 16×8 texels of this mantissa.
+fn hdr(mantissa: u8) -> Vec<u8> {
+    let mut bytes = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8 +X 16\n".to_vec();
+    bytes.extend([mantissa, mantissa, mantissa, 128].repeat(16 * 8));
+    bytes
+}
+
+struct Running {
+    folder: tempfile::TempDir,
+    notices: Receiver<Notice>,
+    socket: PathBuf,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Running {
+    /// A daemon that has published its first revision.
+    fn start(poll: Option<Duration>, source: impl Fn(&Path)) -> Running {
+        let folder = tempfile::tempdir().unwrap();
+        let project = folder.path().join("project");
+        fs::create_dir(&project).unwrap();
+        let text = "version = 1\n[env.sky]\nsource = \"sky.hdr\"\nsize = 64\nbake = \"all\"\n";
+        fs::write(project.join("kiln.toml"), text).unwrap();
+        source(folder.path());
+        let options = DaemonOptions {
+            folder: project,
+            cache: folder.path().join("cache"),
+            jobs: 2,
+            memory_bytes: 1 << 30,
+            cache_bytes_max: 1 << 30,
+            write_outputs: false,
+            poll,
+        };
+        let daemon = Daemon::start(&options).unwrap();
+        let socket = daemon.socket().to_owned();
+        let (sender, notices) = channel();
+        let thread = std::thread::spawn(move || daemon.run(&mut |notice| drop(sender.send(notice))));
+        let running = Running { folder, notices, socket, thread: Some(thread) };
+        let first = running.published();
+        assert!(!has_error(&first), "{:?}", first.diagnostics);
+        running
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn notice(&self) -> Notice {
+        self.notices.recv_timeout(LIMIT).expect("a notice in time")
+    }
+
+    fn published(&self) -> Arc<RevisionTable> {
+        loop {
+            if let Notice::Published(table) = self.notice() {
+                return table;
+            }
+        }
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            return;
+        }
+        kiln_link::stop(&self.socket, LIMIT).unwrap();
+        self.thread.take().unwrap().join().unwrap();
+        // Only this test's own: the folder of the socket is the user's.
+        fs::remove_file(self.socket.with_extension("lock")).unwrap();
+    }
+}
+
+fn has_error(table: &RevisionTable) -> bool {
+    table.diagnostics.iter().any(kiln_diagnostic::Diagnostic::is_error)
+}
+
+fn digests(table: &RevisionTable) -> Vec<kiln_build::Digest> {
+    table.targets.values().flat_map(|target| &target.parts).map(|part| part.digest).collect()
+}
+
+fn plain(folder: &Path) {
+    fs::write(folder.join("project/sky.hdr"), hdr(100)).unwrap();
+}
+
+#[test]
+fn half_written_panorama_is_tried_again_and_its_error_never_published() {
+    let daemon = Running::start(None, plain);
+    let new = hdr(200);
+    let mut file = fs::File::create(daemon.path("project/sky.hdr")).unwrap();
+    file.write_all(&new[..new.len() / 2]).unwrap();
+    loop {
+        match daemon.notice() {
+            Notice::Unfinished { files } => break assert_eq!(files, ["sky.hdr"]),
+            Notice::Published(table) => panic!("half a file was published: {:?}", table.diagnostics),
+            _ => {}
+        }
+    }
+    file.write_all(&new[new.len() / 2..]).unwrap();
+    drop(file);
+    let table = daemon.published();
+    assert!(!has_error(&table), "{:?}", table.diagnostics);
+    assert!(table.targets.values().all(|target| target.state == TargetState::Fresh));
+}
+
+/// The twin: what stays broken is said, once.
+#[test]
+fn panorama_that_stays_half_is_reported_once() {
+    let daemon = Running::start(None, plain);
+    let new = hdr(200);
+    let mut file = fs::File::create(daemon.path("project/sky.hdr")).unwrap();
+    file.write_all(&new[..new.len() / 2]).unwrap();
+    let table = daemon.published();
+    assert!(has_error(&table), "whoever writes has stopped, and keeps the file open");
+    let targets = table.targets.iter().filter(|(name, _)| name.starts_with("env/sky"));
+    assert!(targets.into_iter().all(|(_, target)| target.state == TargetState::Stale));
+    file.write_all(&new[new.len() / 2..]).unwrap();
+    drop(file);
+    assert!(!has_error(&daemon.published()));
+}
+
+#[cfg(unix)]
+#[test]
+fn change_that_nobody_tells_of_is_found_by_polling() {
+    use std::os::unix::fs::symlink;
+    // Two links one after the other: the folder of the second is not watched.
+    let daemon = Running::start(Some(Duration::from_millis(50)), |folder| {
+        for name in ["links", "one", "two"] {
+            fs::create_dir(folder.join(name)).unwrap();
+        }
+        fs::write(folder.join("one/sky.hdr"), hdr(100)).unwrap();
+        fs::write(folder.join("two/sky.hdr"), hdr(200)).unwrap();
+        symlink(folder.join("one/sky.hdr"), folder.join("links/sky.hdr")).unwrap();
+        symlink(folder.join("links/sky.hdr"), folder.join("project/sky.hdr")).unwrap();
+    });
+    let before = kiln_link::status(&daemon.socket, LIMIT).unwrap();
+    assert_eq!(before.revision, 1);
+    fs::remove_file(daemon.path("links/sky.hdr")).unwrap();
+    symlink(daemon.path("two/sky.hdr"), daemon.path("links/sky.hdr")).unwrap();
+    let mut table = daemon.published();
+    // It may have looked between the two steps.
+    if has_error(&table) {
+        table = daemon.published();
+    }
+    assert!(!has_error(&table) && table.number > 1);
+}
+
+#[test]
+fn stop_ends_a_daemon_and_frees_the_project() {
+    let daemon = Running::start(None, plain);
+    let status = kiln_link::status(&daemon.socket, LIMIT).unwrap();
+    assert_eq!((status.pid, status.revision, status.stale.len()), (std::process::id(), 1, 0));
+    let socket = daemon.socket.clone();
+    drop(daemon);
+    assert!(!socket.exists());
+}
+
+#[test]
+fn folder_in_place_of_a_source_is_an_error_until_the_file_is_back() {
+    let daemon = Running::start(None, plain);
+    let sky = daemon.path("project/sky.hdr");
+    fs::remove_file(&sky).unwrap();
+    fs::create_dir(&sky).unwrap();
+    let broken = daemon.published();
+    assert!(has_error(&broken));
+    fs::remove_dir(&sky).unwrap();
+    fs::write(&sky, hdr(200)).unwrap();
+    let mut mended = daemon.published();
+    while has_error(&mended) {
+        mended = daemon.published();
+    }
+    assert_ne!(digests(&broken), digests(&mended), "the last good content was of the first panorama");
+}
