@@ -66,7 +66,8 @@ pub(super) fn show_variants(ui: &mut Ui, state: &mut PanelState) {
     if report.variants.is_empty() {
         return;
     }
-    let shown = report.shown.variant.as_ref().and_then(|name| report.variants.iter().position(|it| it == name));
+    let shown =
+        report.shown.variant.as_ref().and_then(|name| report.variants.iter().position(|it| it == name));
     if let Some(chosen) = pick_or_none(ui, "material variant", "no variant", &report.variants, shown) {
         selection.variant = chosen.map(|index| report.variants[index].clone());
     }

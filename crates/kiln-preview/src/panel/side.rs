@@ -67,9 +67,15 @@ fn show_light(ui: &mut Ui, view: &mut View) {
         row(ui, "Blur", Slider::new(&mut view.background_blur, 0.0..=1.0).max_decimals(2));
     });
     view.environment_rotation_rad = degrees.to_radians();
-    let View { exposure_ev, environment_rotation_rad, environment_intensity, background_blur, .. } = View::default();
-    let neutral =
-        View { exposure_ev, environment_rotation_rad, environment_intensity, background_blur, ..view.clone() };
+    let View { exposure_ev, environment_rotation_rad, environment_intensity, background_blur, .. } =
+        View::default();
+    let neutral = View {
+        exposure_ev,
+        environment_rotation_rad,
+        environment_intensity,
+        background_blur,
+        ..view.clone()
+    };
     if ui.add_enabled(*view != neutral, egui::Button::new("Reset light")).clicked() {
         *view = neutral;
     }

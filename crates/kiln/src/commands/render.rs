@@ -128,7 +128,9 @@ impl<'a> Session<'a> {
             return Err(unknown("material variant", name, &applied.variants));
         }
         self.viewer.view.scene_camera = match &self.args.camera {
-            Some(name) => place_of(name, &applied.cameras).ok_or_else(|| unknown("camera", name, &applied.cameras))?,
+            Some(name) => {
+                place_of(name, &applied.cameras).ok_or_else(|| unknown("camera", name, &applied.cameras))?
+            }
             None => 0,
         };
         self.viewer.view.animation = match &self.args.animation {
