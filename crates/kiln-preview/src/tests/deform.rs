@@ -394,3 +394,70 @@ fn material_variant_changes_materials_and_an_unknown_one_is_said() {
     assert!(report.notes.iter().any(is_said), "{:?}", report.notes);
     assert_eq!(share_that_differs(&first, &picture(&mut viewer, None)), 0.0);
 }
+
+#[test]
+fn shader_that_knows_nothing_of_joints_is_named() {
+    let Some(gpu) = gpu() else { return };
+    let mut build = Build::new();
+    build.shaders(&[&[]]).lut().env("sky", SIX_COLORS).scene("bar", "sky", packed(&bar(steel())));
+    let report = HeadlessViewer::new(gpu, SIZE).apply(&build.revision());
+    for feature in ["skin", "morph", "instancing"] {
+        let is_said = |note: &String| note.starts_with(&format!("`{feature}` of 1 draws is not drawn"));
+        assert!(report.notes.iter().any(is_said), "{feature}: {:?}", report.notes);
+    }
+}
+
+#[test]
+fn shader_that_reads_joints_draws_a_mesh_without_any_as_it_is() {
+    let (Some(gpu), material) = (gpu(), json!({ "pbrMetallicRoughness": { "roughnessFactor": 0.5 } })) else {
+        return;
+    };
+    let mut build = Build::ball(material);
+    let mut viewer = HeadlessViewer::new(gpu, SIZE);
+    viewer.apply(&build.revision());
+    let plain = picture(&mut viewer, None);
+    build.shaders(&[&["instancing", "morph", "skin"]]);
+    let deforming = build.table.targets["shader/pbr/instancing+morph+skin"].clone();
+    build.table.targets.insert("shader/pbr/base".to_owned(), deforming);
+    let report = viewer.apply(&build.revision());
+    assert_eq!(report.diagnostics, vec![]);
+    assert_eq!(report.made, ["shader/pbr/base"]);
+    assert!(share_that_differs(&plain, &picture(&mut viewer, None)) <= EDGE_SHARE);
+}
+
+#[test]
+fn storage_buffer_of_something_else_is_refused_by_name() {
+    let Some(gpu) = gpu() else { return };
+    let text = "
+        @group(2) @binding(1) var<storage, read> joint_matrices: array<vec4f>;
+        @vertex fn vs_main(@location(0) position: vec3f, @location(1) joints: vec4u) -> @builtin(position) vec4f {
+            return vec4f(position, 1.0) + joint_matrices[joints.x];
+        }
+        @fragment fn fs_main() -> @location(0) vec4f { return vec4f(1.0); }";
+    let mut build = Build::ball(json!({}));
+    build.shader_text("pbr", "material", text);
+    let report = HeadlessViewer::new(gpu, SIZE).apply(&build.revision());
+    let messages: Vec<&str> = report.diagnostics.iter().map(|it| it.message.as_str()).collect();
+    let expected = "`shader/pbr/base` declares `joint_matrices` as something else than a read-only storage buffer of array<mat4x4f>";
+    assert!(messages.contains(&expected), "{messages:?}");
+}
+
+#[test]
+fn camera_of_the_file_moves_with_its_node() {
+    let mut made = bar(steel());
+    let document = &mut made.0;
+    document["cameras"] = json!([{ "type": "perspective", "perspective": { "yfov": 0.7, "znear": 0.1 } }]);
+    document["nodes"][3]["children"] = json!([4]);
+    let nodes = document["nodes"].as_array_mut().expect("a list");
+    nodes.push(json!({ "camera": 0, "translation": [0.5, 1, 8], "name": "dolly" }));
+    let pack = packed(&made);
+    let scene = kiln_scene::load(&pack).expect("what was packed loads");
+    assert_eq!(OrbitCamera::names(&scene), ["dolly"]);
+    let Some(mut viewer) = viewer(&pack) else { return };
+    let moved = picture(&mut viewer, Some(2.0));
+    let (cameras, aspect) = (scene.pose(Some(0), 2.0).cameras, SIZE[0] as f32 / SIZE[1] as f32);
+    viewer.view.camera = Some(OrbitCamera::for_scene(scene.bounds, &cameras, 0, aspect));
+    assert_eq!(share_that_differs(&moved, &picture(&mut viewer, Some(2.0))), 0.0);
+    viewer.view.camera = Some(OrbitCamera::for_scene(scene.bounds, &scene.cameras, 0, aspect));
+    assert!(share_that_differs(&moved, &picture(&mut viewer, Some(2.0))) > 0.05);
+}
