@@ -77,6 +77,8 @@ struct Draw {
 
 @group(1) @binding(0) var<uniform> material: Material;
 @group(2) @binding(0) var<uniform> draw: Draw;
+// Where each copy stands in the draw.
+@if(instancing) @group(2) @binding(4) var<storage, read> instances: array<mat4x4f>;
 
 // Base colour is read through it, and so are the maps of anisotropy, iridescence, volume and diffuse transmission: backends have places
 // for 16 samplers, and materials that wrap these otherwise than their base colour are rare.
@@ -89,6 +91,10 @@ struct Vertex {
     @location(3) uv1: vec2f,
     @if((anisotropy || clearcoat || normal_map) && !unlit) @location(4) tangent: vec4f,
     @if(vertex_color) @location(5) color: vec4f,
+    @if(skin) @location(6) joints: vec4u,
+    @if(skin) @location(7) weights: vec4f,
+    @if(morph) @builtin(vertex_index) index: u32,
+    @if(instancing) @builtin(instance_index) instance: u32,
 }
 
 struct Varying {
@@ -99,4 +105,5 @@ struct Varying {
     @location(3) uv1: vec2f,
     @if((anisotropy || clearcoat || normal_map) && !unlit) @location(4) tangent: vec4f,
     @if(vertex_color) @location(5) color: vec4f,
+    @if(instancing && (diffuse_transmission || transmission) && volume && !unlit) @location(6) @interpolate(flat, either) instance: u32,
 }

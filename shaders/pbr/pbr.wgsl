@@ -10,6 +10,9 @@ import lib::vector::normalize_or;
 @if(anisotropy && !unlit) import super::anisotropy::{brush, brushed_normal};
 @if(!unlit) import super::base::{Base, base_radiance, filtered_roughness};
 @if(clearcoat && !unlit) import super::clearcoat::{coat, under_coat};
+@if(instancing) import super::deform::instanced;
+@if(morph) import super::deform::morphed;
+@if(skin) import super::deform::skinned;
 @if(diffuse_transmission && !unlit) import super::diffuse_transmission::scattering;
 import super::interface::{base_color_sampler, draw, material, Varying, Vertex};
 @if(iridescence && !unlit) import super::iridescence::film;
@@ -32,7 +35,11 @@ import super::interface::{base_color_sampler, draw, material, Varying, Vertex};
 @if(emission && !unlit) @group(1) @binding(10) var emissive_sampler: sampler;
 
 @vertex
-fn vs_main(vertex: Vertex) -> Varying {
+fn vs_main(source: Vertex) -> Varying {
+    var vertex = source;
+    @if(morph) vertex = morphed(vertex);
+    @if(skin) vertex = skinned(vertex);
+    @if(instancing) vertex = instanced(vertex);
     var out: Varying;
     let world_position = draw.world_from_object * vec4f(vertex.position, 1.0);
     out.clip_position = frame.clip_from_world * world_position;
@@ -46,6 +53,7 @@ fn vs_main(vertex: Vertex) -> Varying {
         out.tangent = vec4f(normalize_or(tangent, vec3f(0.0)), vertex.tangent.w);
     }
     @if(vertex_color) out.color = vertex.color;
+    @if(instancing && (diffuse_transmission || transmission) && volume && !unlit) out.instance = vertex.instance;
     return out;
 }
 

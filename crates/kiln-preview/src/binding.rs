@@ -3,17 +3,19 @@
 use std::sync::Arc;
 
 use kiln_gpu::Gpu;
-use kiln_scene::{Light, Material, Scene};
+use kiln_scene::{Draw, Light, Material, Scene};
+use kiln_shader::Member;
 use wgpu::util::{BufferInitDescriptor, DeviceExt as _};
 
 use crate::lights;
 use crate::own::OwnGroup;
 use crate::parameter::ParameterValues;
+use crate::pose::Pose;
 use crate::prepare::Environment;
 use crate::program::{Bound, Program};
 use crate::scene_gpu::GpuScene;
 use crate::slot::Slot;
-use crate::uniform::{FrameValues, fill_block, material_member};
+use crate::uniform::{FrameValues, draw_member, fill_block, material_member};
 
 /// What all draws of one program share: group 0 with the buffer that each frame writes, and what the author added.
 #[derive(Debug)]
@@ -91,36 +93,107 @@ impl FrameBinding {
 }
 
 /// Group 1: a material as one program reads it.
-pub(crate) fn material_group(
-    gpu: &Gpu,
-    program: &Program,
-    scene: &GpuScene,
-    material: &Material,
-) -> Option<wgpu::BindGroup> {
-    let uniform = program.groups[1].iter().find(|bound| bound.slot == Slot::Material);
-    let buffer = uniform.map(|bound| {
-        let (size_bytes, members) =
-            bound.block.as_ref().map_or((0, &[][..]), |(size, members)| (*size, members));
-        uniform_buffer(gpu, bound, fill_block(size_bytes, members, |name| material_member(material, name)))
-    });
-    create_group(gpu, program, 1, |bound| match bound.slot {
-        Slot::Material => buffer.as_ref().map(wgpu::Buffer::as_entire_binding),
-        Slot::MaterialTexture(map) => {
-            Some(wgpu::BindingResource::TextureView(scene.texture(material, map).0))
-        }
-        Slot::MaterialSampler(map) => Some(wgpu::BindingResource::Sampler(scene.texture(material, map).1)),
-        _ => None,
-    })
+#[derive(Debug)]
+pub(crate) struct MaterialBinding {
+    pub group: Option<wgpu::BindGroup>,
+    block: Option<(wgpu::Buffer, Bound)>,
 }
 
-/// Group 2: one buffer for all draws of a program, read at a dynamic offset.
-pub(crate) fn draw_group(gpu: &Gpu, program: &Program, blocks: &[u8]) -> Option<wgpu::BindGroup> {
-    let bound = program.groups[2].first()?;
-    let size = bound.block.as_ref().map_or(0, |(size, _)| u64::from(*size));
-    let buffer = uniform_buffer(gpu, bound, blocks.to_vec());
-    create_group(gpu, program, 2, |_| {
-        let binding = wgpu::BufferBinding { buffer: &buffer, offset: 0, size: size.try_into().ok() };
-        Some(wgpu::BindingResource::Buffer(binding))
+impl MaterialBinding {
+    /// Binds the scene's textures and writes the material's numbers.
+    pub fn new(gpu: &Gpu, program: &Program, scene: &GpuScene, material: &Material) -> Self {
+        let uniform = program.groups[1].iter().find(|bound| bound.slot == Slot::Material);
+        let block = uniform.map(|bound| (uniform_buffer(gpu, bound, Vec::new()), bound.clone()));
+        let group = create_group(gpu, program, 1, |bound| match bound.slot {
+            Slot::Material => block.as_ref().map(|(buffer, _)| buffer.as_entire_binding()),
+            Slot::MaterialTexture(map) => {
+                Some(wgpu::BindingResource::TextureView(scene.texture(material, map).0))
+            }
+            Slot::MaterialSampler(map) => {
+                Some(wgpu::BindingResource::Sampler(scene.texture(material, map).1))
+            }
+            _ => None,
+        });
+        let binding = MaterialBinding { group, block };
+        binding.write(gpu, material);
+        binding
+    }
+
+    /// Writes the material's numbers; its textures stay.
+    pub fn write(&self, gpu: &Gpu, material: &Material) {
+        if let Some((buffer, Bound { block: Some((size_bytes, members)), .. })) = &self.block {
+            let block = fill_block(*size_bytes, members, |name| material_member(material, name));
+            gpu.queue.write_buffer(buffer, 0, &block);
+        }
+    }
+}
+
+/// The `draw` blocks of all draws of a program in one buffer, read at a dynamic offset.
+#[derive(Debug)]
+pub(crate) struct DrawBlocks {
+    buffer: wgpu::Buffer,
+    size_bytes: u32,
+    /// From block to block.
+    stride_bytes: usize,
+    members: Vec<Member>,
+    /// Numbers of the draws, ascending.
+    draws: Vec<usize>,
+}
+
+impl DrawBlocks {
+    /// `None` if the program reads no such block.
+    pub fn new(gpu: &Gpu, program: &Program, draws: Vec<usize>, pose: &Pose) -> Option<Self> {
+        let bound = program.groups[2].iter().find(|bound| bound.slot == Slot::Draw)?;
+        let (size_bytes, members) = bound.block.clone()?;
+        let alignment = gpu.device.limits().min_uniform_buffer_offset_alignment as usize;
+        let stride_bytes = (size_bytes as usize).next_multiple_of(alignment);
+        let buffer = uniform_buffer(gpu, bound, vec![0; stride_bytes * draws.len()]);
+        let blocks = DrawBlocks { buffer, size_bytes, stride_bytes, members, draws };
+        blocks.write(gpu, pose);
+        Some(blocks)
+    }
+
+    /// Where the block of a draw begins.
+    pub fn offset_of(&self, draw: usize) -> u32 {
+        (self.draws.partition_point(|&other| other < draw) * self.stride_bytes) as u32
+    }
+
+    /// Writes where the draws are.
+    pub fn write(&self, gpu: &Gpu, pose: &Pose) {
+        let mut bytes = Vec::with_capacity(self.draws.len() * self.stride_bytes);
+        for &draw in &self.draws {
+            let world = pose.draws[draw].world;
+            bytes.extend(fill_block(self.size_bytes, &self.members, |name| draw_member(world, name)));
+            bytes.resize(bytes.len().next_multiple_of(self.stride_bytes), 0);
+        }
+        gpu.queue.write_buffer(&self.buffer, 0, &bytes);
+    }
+}
+
+/// Group 2 of a draw, with its number.
+pub(crate) fn draw_group(
+    gpu: &Gpu,
+    program: &Program,
+    blocks: Option<&DrawBlocks>,
+    scene: &GpuScene,
+    (index, draw): (usize, &Draw),
+) -> Option<wgpu::BindGroup> {
+    let stored = |slot: Slot| match slot {
+        Slot::JointMatrices => scene.joint_matrices[draw.skin?].as_ref(),
+        Slot::MorphDeltas => scene.meshes[draw.primitive].morph_deltas.as_ref(),
+        Slot::MorphWeights => scene.morph_weights[draw.morph?].as_ref(),
+        Slot::Instances => scene.instances[index].as_ref(),
+        _ => None,
+    };
+    create_group(gpu, program, 2, |bound| match bound.slot {
+        Slot::Draw => blocks.map(|blocks| {
+            let size = u64::from(blocks.size_bytes).try_into().ok();
+            wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer: &blocks.buffer, offset: 0, size })
+        }),
+        Slot::MorphDeltas | Slot::MorphWeights => {
+            Some(stored(bound.slot).unwrap_or(&scene.neutral_morph).as_entire_binding())
+        }
+        _ => Some(stored(bound.slot).unwrap_or(&scene.neutral_matrix).as_entire_binding()),
     })
 }
 

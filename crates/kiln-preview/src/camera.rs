@@ -39,19 +39,18 @@ impl OrbitCamera {
         field_of_view_rad: FIELD_OF_VIEW_RAD,
     };
 
-    /// The first perspective camera of the file (its roll is not kept), else one that shows the whole scene from
-    /// slightly above and beside its front. `aspect` = width / height.
-    pub fn for_scene(scene: &Scene, aspect: f32) -> Self {
-        let bounds = scene.bounds.unwrap_or(Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE });
-        let of_file = scene.cameras.iter().find_map(|camera| Self::from_file(camera, bounds));
+    /// The `index`th of the [named](Self::names) cameras, where `cameras` has it now (its roll is not kept); else one that
+    /// shows all of `bounds` from slightly above and beside its front. `aspect` = width / height.
+    pub fn for_scene(bounds: Option<Bounds>, cameras: &[Camera], index: usize, aspect: f32) -> Self {
+        let bounds = bounds.unwrap_or(Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE });
+        let of_file = cameras.iter().filter(|camera| is_shown(camera)).nth(index);
+        let of_file = of_file.and_then(|camera| Self::from_file(camera, bounds));
         of_file.unwrap_or_else(|| Self::framing(bounds, aspect))
     }
 
-    /// The perspective cameras of the file by name, as they stand at rest; their roll is not kept.
-    pub fn of_scene(scene: &Scene) -> Vec<(String, OrbitCamera)> {
-        let bounds = scene.bounds.unwrap_or(Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE });
-        let named = |camera: &Camera| Some((camera.name.clone(), Self::from_file(camera, bounds)?));
-        scene.cameras.iter().filter_map(named).collect()
+    /// Names of the file's cameras that can be looked through: the perspective ones.
+    pub fn names(scene: &Scene) -> Vec<String> {
+        scene.cameras.iter().filter(|camera| is_shown(camera)).map(|camera| camera.name.clone()).collect()
     }
 
     fn from_file(camera: &Camera, bounds: Bounds) -> Option<Self> {
@@ -146,6 +145,10 @@ impl OrbitCamera {
     pub fn dolly(&mut self, factor: f32) {
         self.distance = (self.distance * factor).clamp(1e-5, 1e7);
     }
+}
+
+fn is_shown(camera: &Camera) -> bool {
+    camera.yfov_rad.is_some()
 }
 
 fn center(bounds: Bounds) -> Vec3 {

@@ -1,37 +1,43 @@
 //! What to draw, with which pipeline and bindings.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
 
-use glam::{Mat4, Vec3};
 use kiln_gpu::Gpu;
-use kiln_scene::{AlphaMode, Draw, Material};
+use kiln_scene::{AlphaMode, Draw, Effect, EffectSet, Material, Scene, Target};
 
-use crate::binding::{draw_group, material_group};
+use crate::binding::{DrawBlocks, MaterialBinding, draw_group};
+use crate::pose::Pose;
 use crate::program::{Program, Raster};
-use crate::scene_gpu::GpuScene;
-use crate::uniform::{draw_member, fill_block};
+use crate::scene_gpu::{GpuScene, all_draws};
+use crate::slot::Slot;
 
 /// One indexed draw.
 #[derive(Debug)]
 pub(crate) struct DrawItem {
+    /// With the raster state it has at rest.
     pub pipeline: wgpu::RenderPipeline,
+    pub raster: Raster,
     pub material_group: Option<wgpu::BindGroup>,
+    pub draw_group: Option<wgpu::BindGroup>,
     /// Index into [`DrawList::programs`].
     pub program: usize,
     /// Offset of its `draw` block.
-    pub draw_offset: u32,
+    pub draw_offset: Option<u32>,
     /// Index into [`GpuScene::meshes`].
     pub mesh: usize,
-    /// Middle of its bounds in the world, to sort by.
-    pub center: Vec3,
+    /// Joints of its vertices, if its program reads them.
+    pub influences: Option<wgpu::Buffer>,
+    /// Index into [`Pose::draws`].
+    pub draw: usize,
+    pub instance_count: u32,
 }
 
 /// What all draws of a program share.
 #[derive(Debug)]
 pub(crate) struct ProgramBinding {
     pub program: Arc<Program>,
-    pub draw_group: Option<wgpu::BindGroup>,
+    blocks: Option<DrawBlocks>,
 }
 
 /// Everything to draw of a scene.
@@ -44,10 +50,14 @@ pub(crate) struct DrawList {
     pub transmissive: Vec<DrawItem>,
     /// Blended over what lies behind; to be drawn from far to near.
     pub blended: Vec<DrawItem>,
+    /// How many draws ask their shader for something that it does not read.
+    pub unread: BTreeMap<Effect, usize>,
+    /// Materials that some animation changes, by their index in the scene.
+    animated_materials: Vec<(usize, MaterialBinding)>,
 }
 
-/// The program for a material, if there is one.
-pub(crate) type FindProgram<'a> = &'a mut dyn FnMut(&Material) -> Option<Arc<Program>>;
+/// The program for a set of effects, if there is one.
+pub(crate) type FindProgram<'a> = &'a mut dyn FnMut(&EffectSet) -> Option<Arc<Program>>;
 
 impl DrawList {
     /// Whether anything reads what is opaque behind it.
@@ -55,100 +65,163 @@ impl DrawList {
         self.programs.iter().any(|binding| binding.program.reads_scene_color())
     }
 
-    /// Resolves every draw of the scene; materials without a program are left out.
-    pub fn new(gpu: &Gpu, scene: &GpuScene, find_program: FindProgram<'_>) -> Self {
-        let mut builder = Builder { gpu, scene, programs: Vec::new(), material_groups: HashMap::new() };
-        let mut list = DrawList::default();
-        for draw in &scene.scene.draws {
-            let Some(primitive) = scene.scene.primitives.get(draw.primitive) else { continue };
-            let Some(material) = scene.scene.materials.get(primitive.material) else { continue };
-            let Some(program) = find_program(material) else { continue };
-            let items = builder.items(draw, primitive.material, material, &program);
+    /// Resolves every draw of the scene with the materials that it has in `variant`; draws without a program are left out.
+    pub fn new(gpu: &Gpu, scene: &GpuScene, variant: Option<usize>, find_program: FindProgram<'_>) -> Self {
+        let mut plan = Plan::default();
+        for (index, draw) in all_draws(&scene.scene).enumerate() {
+            let material = scene.scene.material_of(draw, variant);
+            if let Some(program) = find_program(&scene.scene.effects(draw, material)) {
+                plan.push(index, material, &program);
+            }
+        }
+        plan.bind(gpu, scene)
+    }
+
+    /// Writes where draws are, how they are deformed, and the materials that move.
+    pub fn write(&self, gpu: &Gpu, scene: &GpuScene, pose: &Pose) {
+        for blocks in self.programs.iter().filter_map(|binding| binding.blocks.as_ref()) {
+            blocks.write(gpu, pose);
+        }
+        for (index, binding) in &self.animated_materials {
+            let moved = pose.posed.materials.get(index);
+            binding.write(gpu, moved.unwrap_or(&scene.scene.materials[*index]));
+        }
+    }
+}
+
+/// Which draw has which material and program.
+#[derive(Default)]
+struct Plan {
+    /// Draw, material, program.
+    draws: Vec<(usize, usize, usize)>,
+    /// With the numbers of their draws.
+    programs: Vec<(Arc<Program>, Vec<usize>)>,
+}
+
+impl Plan {
+    fn push(&mut self, draw: usize, material: usize, program: &Arc<Program>) {
+        let known = self.programs.iter().position(|(other, _)| Arc::ptr_eq(other, program));
+        let index = known.unwrap_or_else(|| {
+            self.programs.push((Arc::clone(program), Vec::new()));
+            self.programs.len() - 1
+        });
+        self.programs[index].1.push(draw);
+        self.draws.push((draw, material, index));
+    }
+
+    fn bind(self, gpu: &Gpu, scene: &GpuScene) -> DrawList {
+        let pose = Pose::at_rest(scene);
+        let bind = |(program, draws): (Arc<Program>, Vec<usize>)| {
+            let blocks = DrawBlocks::new(gpu, &program, draws, &pose);
+            ProgramBinding { program, blocks }
+        };
+        let programs = self.programs.into_iter().map(bind).collect();
+        let mut list = DrawList { programs, ..DrawList::default() };
+        let mut groups = Groups { gpu, scene, materials: HashMap::new(), draws: HashMap::new() };
+        let draws: Vec<&Draw> = all_draws(&scene.scene).collect();
+        for (index, material, program) in self.draws {
+            let draw = draws[index];
+            let ProgramBinding { program: shared, blocks } = &list.programs[program];
+            for effect in unread(draw, shared) {
+                *list.unread.entry(effect).or_default() += 1;
+            }
+            let material_group = groups.of_material((material, program), shared);
+            let draw_group = groups.of_draw((index, program), shared, blocks.as_ref(), draw);
+            let copies = if shared.reads_of_draw(Slot::Instances) { draw.instances.len().max(1) } else { 1 };
+            let influences = shared.reads_influences().then(|| scene.influences(gpu, draw.primitive));
+            let material = &scene.scene.materials[material];
+            let item = |raster| DrawItem {
+                pipeline: shared.pipeline(&gpu.device, raster),
+                raster,
+                material_group: material_group.clone(),
+                draw_group: draw_group.clone(),
+                program,
+                draw_offset: blocks.as_ref().map(|blocks| blocks.offset_of(index)),
+                mesh: draw.primitive,
+                influences: influences.clone(),
+                draw: index,
+                instance_count: copies as u32,
+            };
+            let items = rasters(pose.draws[index].mirrored, material).into_iter().map(item);
             let group = match material.alpha_mode {
                 AlphaMode::Blend => &mut list.blended,
-                _ if program.reads_scene_color() => &mut list.transmissive,
+                _ if shared.reads_scene_color() => &mut list.transmissive,
                 _ => &mut list.opaque,
             };
             group.extend(items);
         }
-        list.programs = builder.bindings();
+        let animated = animated_materials(&scene.scene);
+        let bindings = groups.materials.into_iter().map(|((material, _), binding)| (material, binding));
+        list.animated_materials = bindings.filter(|(material, _)| animated.contains(material)).collect();
         list
     }
 }
 
-struct Builder<'a> {
+/// Bind groups that draws may share.
+struct Groups<'a> {
     gpu: &'a Gpu,
     scene: &'a GpuScene,
-    /// Programs in use with the `draw` blocks of their draws.
-    programs: Vec<(Arc<Program>, Vec<u8>)>,
-    material_groups: HashMap<(usize, usize), Option<wgpu::BindGroup>>,
+    /// By material and program.
+    materials: HashMap<(usize, usize), MaterialBinding>,
+    /// By program, and by draw where each has its own.
+    draws: HashMap<(usize, Option<usize>), Option<wgpu::BindGroup>>,
 }
 
-impl Builder<'_> {
-    fn items(
+impl Groups<'_> {
+    fn of_material(&mut self, key: (usize, usize), program: &Program) -> Option<wgpu::BindGroup> {
+        let material = &self.scene.scene.materials[key.0];
+        let binding = self.materials.entry(key);
+        let binding =
+            binding.or_insert_with(|| MaterialBinding::new(self.gpu, program, self.scene, material));
+        binding.group.clone()
+    }
+
+    fn of_draw(
         &mut self,
+        (index, program_index): (usize, usize),
+        program: &Program,
+        blocks: Option<&DrawBlocks>,
         draw: &Draw,
-        material_index: usize,
-        material: &Material,
-        program: &Arc<Program>,
-    ) -> Vec<DrawItem> {
-        let index = self.program_index(program);
-        let draw_offset = self.push_draw_block(index, draw.world);
-        let group = self.material_groups.entry((material_index, index));
-        let group = group.or_insert_with(|| material_group(self.gpu, program, self.scene, material)).clone();
-        let bounds = self.scene.scene.primitives[draw.primitive].bounds;
-        let item = |raster| DrawItem {
-            pipeline: program.pipeline(&self.gpu.device, raster),
-            material_group: group.clone(),
-            program: index,
-            draw_offset,
-            mesh: draw.primitive,
-            center: draw.world.transform_point3((bounds.min + bounds.max) / 2.0),
-        };
-        rasters(draw.world, material).into_iter().map(item).collect()
-    }
-
-    fn program_index(&mut self, program: &Arc<Program>) -> usize {
-        let known = self.programs.iter().position(|(other, _)| Arc::ptr_eq(other, program));
-        known.unwrap_or_else(|| {
-            self.programs.push((Arc::clone(program), Vec::new()));
-            self.programs.len() - 1
-        })
-    }
-
-    fn push_draw_block(&mut self, program: usize, world: Mat4) -> u32 {
-        let (program, blocks) = &mut self.programs[program];
-        let Some((size_bytes, members)) = program.groups[2].first().and_then(|bound| bound.block.as_ref())
-        else {
-            return 0;
-        };
-        let offset = blocks.len();
-        blocks.extend(fill_block(*size_bytes, members, |name| draw_member(world, name)));
-        let alignment = self.gpu.device.limits().min_uniform_buffer_offset_alignment as usize;
-        blocks.resize(blocks.len().next_multiple_of(alignment), 0);
-        offset as u32
-    }
-
-    fn bindings(self) -> Vec<ProgramBinding> {
-        let gpu = self.gpu;
-        let bind = |(program, blocks): (Arc<Program>, Vec<u8>)| {
-            let draw_group = draw_group(gpu, &program, &blocks);
-            ProgramBinding { program, draw_group }
-        };
-        self.programs.into_iter().map(bind).collect()
+    ) -> Option<wgpu::BindGroup> {
+        let has_its_own = program.groups[2].iter().any(|bound| bound.slot.is_stored());
+        let group = self.draws.entry((program_index, has_its_own.then_some(index)));
+        group.or_insert_with(|| draw_group(self.gpu, program, blocks, self.scene, (index, draw))).clone()
     }
 }
 
-/// How to rasterise a draw. A mirroring transform turns triangles around. A blended surface with two sides is drawn
-/// twice, its far side first, because blending needs that order.
-fn rasters(world: Mat4, material: &Material) -> Vec<Raster> {
-    let mirrored = world.determinant() < 0.0;
-    let front_face = if mirrored { wgpu::FrontFace::Cw } else { wgpu::FrontFace::Ccw };
+/// What a draw's geometry calls for and its program knows nothing of.
+fn unread(draw: &Draw, program: &Program) -> impl Iterator<Item = Effect> {
+    let is_read = |effect: &Effect| match effect {
+        Effect::Skin => program.reads_of_draw(Slot::JointMatrices),
+        Effect::Morph => program.reads_of_draw(Slot::MorphDeltas),
+        Effect::Instancing => program.reads_of_draw(Slot::Instances),
+        _ => true,
+    };
+    draw.effects().into_iter().filter(move |effect| !is_read(effect))
+}
+
+fn animated_materials(scene: &Scene) -> BTreeSet<usize> {
+    let channels = scene.animations.iter().flat_map(|animation| &animation.channels);
+    let material = |target: Target| match target {
+        Target::Material { material, .. } => Some(material),
+        _ => None,
+    };
+    channels.filter_map(|channel| material(channel.target)).collect()
+}
+
+/// How to rasterise a draw. A blended surface with two sides is drawn twice, its far side first, because blending needs
+/// that order.
+fn rasters(mirrored: bool, material: &Material) -> Vec<Raster> {
     let blend = material.alpha_mode == AlphaMode::Blend;
-    let raster = |cull| Raster { cull, front_face, blend };
+    let raster = |cull| Raster { cull, front_face: front_face(mirrored), blend };
     match (material.double_sided, blend) {
         (true, true) => vec![raster(Some(wgpu::Face::Front)), raster(Some(wgpu::Face::Back))],
         (true, false) => vec![raster(None)],
         (false, _) => vec![raster(Some(wgpu::Face::Back))],
     }
+}
+
+/// A mirroring transform turns triangles around.
+pub(crate) fn front_face(mirrored: bool) -> wgpu::FrontFace {
+    if mirrored { wgpu::FrontFace::Cw } else { wgpu::FrontFace::Ccw }
 }

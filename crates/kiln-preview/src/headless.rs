@@ -9,7 +9,6 @@ use kiln_image::Image;
 use kiln_link::Revision;
 
 use crate::assignment::{Assignment, RefusedParameter};
-use crate::camera::OrbitCamera;
 use crate::prepare::Preparer;
 use crate::renderer::Renderer;
 use crate::report::ApplyReport;
@@ -122,12 +121,6 @@ impl HeadlessViewer {
         let rgb = bytes.chunks_exact(8).flat_map(|texel| texel[..6].chunks_exact(2).map(channel)).collect();
         let incomplete = |_| GpuError::Readback { reason: "the picture is incomplete".to_owned() };
         Image::new(size[0], size[1], rgb).map_err(incomplete)
-    }
-
-    /// The cameras of the scene that is shown, by name.
-    pub fn cameras(&self) -> Vec<(String, OrbitCamera)> {
-        let scene = self.renderer.shown().and_then(|prepared| prepared.scene.as_ref());
-        scene.map_or_else(Vec::new, |scene| OrbitCamera::of_scene(&scene.scene))
     }
 
     /// Whether frames go through a picture of the opaque scene.

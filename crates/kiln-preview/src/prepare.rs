@@ -6,7 +6,7 @@ use std::sync::Arc;
 use kiln_diagnostic::Diagnostic;
 use kiln_gpu::Gpu;
 use kiln_link::{Revision, Target};
-use kiln_scene::{Effect, Material, variant_name};
+use kiln_scene::{Effect, EffectSet, Material, variant_name};
 use kiln_shader::Reflection;
 
 use crate::draw_list::DrawList;
@@ -111,8 +111,13 @@ impl Preparer {
             (pipeline, program)
         });
         let shader = meta.map_or_else(|| "pbr".to_owned(), |meta| meta.shader);
-        let draws = scene.as_ref().map(|scene| self.draws(revision, scene, &shader, &mut report));
-        report.shown = Selection { scene: scene_name, env };
+        let variant = scene.as_ref().and_then(|scene| {
+            report.describe_scene(&scene.scene);
+            choose_variant(selection.variant.as_deref(), &mut report)
+        });
+        let draws = scene.as_ref().map(|scene| self.draws(revision, scene, variant, &shader, &mut report));
+        let variant = variant.map(|index| report.variants[index].clone());
+        report.shown = Selection { scene: scene_name, env, variant };
         // A scene's notes stand in its facts and in its GLB.
         let mut said = std::collections::BTreeSet::new();
         report.notes.retain(|note| said.insert(note.clone()));
@@ -288,24 +293,31 @@ impl Preparer {
         &mut self,
         revision: &Revision,
         scene: &GpuScene,
+        variant: Option<usize>,
         shader: &str,
         report: &mut ApplyReport,
     ) -> DrawList {
         let mut found: HashMap<String, Option<Arc<Program>>> = HashMap::new();
         let gpu = self.gpu.clone();
         let overrides = project_meta(revision).effects;
-        let mut find = |material: &Material| {
-            let name = format!("shader/{shader}/{}", variant_name(&overrides.apply(&material.effects)));
+        let mut find = |effects: &EffectSet| {
+            let name = format!("shader/{shader}/{}", variant_name(&overrides.apply(effects)));
             if !found.contains_key(&name) {
                 let program = self.variant(revision, shader, &name, report);
                 found.insert(name.clone(), program);
             }
             found[&name].clone()
         };
-        let (draws, fault) = gpu.catch_errors(|| DrawList::new(&gpu, scene, &mut find));
+        let (draws, fault) = gpu.catch_errors(|| DrawList::new(&gpu, scene, variant, &mut find));
         let faulty =
             |fault: String| Diagnostic::error("the scene cannot be bound to its shaders").with_note(fault);
         report.diagnostics.extend(fault.map(faulty));
+        for (effect, count) in &draws.unread {
+            let effect = effect.name();
+            report.notes.push(format!(
+                "`{effect}` of {count} draws is not drawn: `shader/{shader}` reads nothing of it, see docs/shader-interface.md"
+            ));
+        }
         let count = scene.scene.lights.len();
         let capacities = found.values().flatten().filter_map(|program| program.light_capacity());
         if let Some(capacity) = capacities.min().filter(|capacity| count > *capacity) {
@@ -371,6 +383,17 @@ fn scene_meta(revision: &Revision, name: &str, report: &mut ApplyReport) -> Opti
             None
         }
     }
+}
+
+/// Index of the variant asked for; what is not there is said.
+fn choose_variant(asked: Option<&str>, report: &mut ApplyReport) -> Option<usize> {
+    let asked = asked?;
+    let found = report.variants.iter().position(|name| name == asked);
+    if found.is_none() {
+        let known = if report.variants.is_empty() { "none".to_owned() } else { report.variants.join(", ") };
+        report.notes.push(format!("there is no material variant `{asked}`; the scene has {known}"));
+    }
+    found
 }
 
 fn absent(name: &str, revision: &Revision, has_last_good: bool) -> String {

@@ -5,7 +5,6 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use kiln_diagnostic::Diagnostic;
 use kiln_gpu::Gpu;
-use kiln_scene::Vertex;
 use kiln_shader::{Binding, BindingKind, Member, Override, Reflection, Stage};
 
 use crate::keeper::make_checked;
@@ -15,6 +14,7 @@ use crate::parameter::{OfferedParameter, ParameterValues, offered};
 use crate::slot::Slot;
 use crate::target::Role;
 use crate::uniform::{FrameValues, Value, draw_member, long_type_name, material_member};
+use crate::vertex_input::VertexInputs;
 
 /// Format of the image that material and background shaders write.
 pub(crate) const HDR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
@@ -84,7 +84,7 @@ pub(crate) struct Program {
     name: String,
     role: Role,
     module: wgpu::ShaderModule,
-    attributes: Vec<wgpu::VertexAttribute>,
+    inputs: VertexInputs,
     /// Bindings by group.
     pub groups: [Vec<Bound>; GROUP_COUNT],
     /// Layouts by group; `None` where nothing is declared.
@@ -117,8 +117,10 @@ impl Program {
         own: &OwnTextures,
     ) -> Result<Self, Diagnostic> {
         let device = &gpu.device;
-        let attributes = check_entry_points(name, role, reflection)?;
+        check_entry_points(name, reflection)?;
+        let inputs = VertexInputs::new(name, role, reflection)?;
         let groups = check_bindings(name, role, &reflection.bindings)?;
+        check_storage(gpu, name, &groups[2])?;
         own.check(name, &groups[3])?;
         let layouts =
             [0, 1, 2, 3].map(|group| create_layout(device, name, group, &groups[group], reflection));
@@ -139,7 +141,7 @@ impl Program {
             name: name.to_owned(),
             role,
             module,
-            attributes,
+            inputs,
             groups,
             layouts,
             own_group,
@@ -196,6 +198,16 @@ impl Program {
         self.groups[0].iter().find_map(Bound::light_capacity)
     }
 
+    /// Whether it reads the joints that vertices hang on.
+    pub fn reads_influences(&self) -> bool {
+        self.inputs.reads_influences()
+    }
+
+    /// Whether it declares `slot` in group 2.
+    pub fn reads_of_draw(&self, slot: Slot) -> bool {
+        self.groups[2].iter().any(|bound| bound.slot == slot)
+    }
+
     fn create_pipeline(
         &self,
         device: &wgpu::Device,
@@ -205,11 +217,7 @@ impl Program {
         let constants: Vec<(&str, f64)> =
             constants.iter().map(|(name, value)| (name.as_str(), *value)).collect();
         let options = wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() };
-        let buffers = [Some(wgpu::VertexBufferLayout {
-            array_stride: size_of::<Vertex>() as u64,
-            step_mode: wgpu::VertexStepMode::Vertex,
-            attributes: &self.attributes,
-        })];
+        let buffers = self.inputs.layouts();
         let is_tonemap = self.role == Role::Tonemap;
         device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: None,
@@ -280,11 +288,7 @@ fn constants(
     parameters.iter().filter(|parameter| parameter.is_override).filter_map(constant).collect()
 }
 
-fn check_entry_points(
-    name: &str,
-    role: Role,
-    reflection: &Reflection,
-) -> Result<Vec<wgpu::VertexAttribute>, Diagnostic> {
+fn check_entry_points(name: &str, reflection: &Reflection) -> Result<(), Diagnostic> {
     for (entry, stage) in [("vs_main", Stage::Vertex), ("fs_main", Stage::Fragment)] {
         if !reflection.entry_points.iter().any(|point| point.name == entry && point.stage == stage) {
             return Err(Diagnostic::error(format!("`{name}` has no entry point `{entry}`")).with_note(
@@ -292,39 +296,23 @@ fn check_entry_points(
             ));
         }
     }
-    let vertex = reflection.entry_points.iter().find(|point| point.name == "vs_main");
-    let inputs = vertex.map_or(&[][..], |point| &point.inputs);
-    if role != Role::Material && !inputs.is_empty() {
-        return Err(Diagnostic::error(format!("`{name}` reads the vertex input `{}`", inputs[0].name))
-            .with_note("background and tonemap draw one triangle by `@builtin(vertex_index)` alone"));
-    }
-    inputs.iter().map(|input| vertex_attribute(name, &input.name, &input.ty, input.location)).collect()
+    Ok(())
 }
 
-fn vertex_attribute(
-    shader: &str,
-    input: &str,
-    ty: &str,
-    shader_location: u32,
-) -> Result<wgpu::VertexAttribute, Diagnostic> {
-    use wgpu::VertexFormat::{Float32x2, Float32x3, Float32x4};
-    let (format, offset, expected) = match input {
-        "position" => (Float32x3, std::mem::offset_of!(Vertex, position), "vec3<f32>"),
-        "normal" => (Float32x3, std::mem::offset_of!(Vertex, normal), "vec3<f32>"),
-        "tangent" => (Float32x4, std::mem::offset_of!(Vertex, tangent), "vec4<f32>"),
-        "uv0" => (Float32x2, std::mem::offset_of!(Vertex, uv0), "vec2<f32>"),
-        "uv1" => (Float32x2, std::mem::offset_of!(Vertex, uv1), "vec2<f32>"),
-        "color" => (Float32x4, std::mem::offset_of!(Vertex, color), "vec4<f32>"),
-        _ => {
-            return Err(Diagnostic::error(format!("`{shader}` reads the unknown vertex input `{input}`"))
-                .with_help("use position, normal, tangent, uv0, uv1 or color"));
-        }
-    };
-    if long_type_name(ty) != expected {
-        let message = format!("`{shader}` reads the vertex input `{input}` as {ty}; it is a {expected}");
-        return Err(Diagnostic::error(message));
+/// Devices of the OpenGL ES 3.0 class have no storage buffers, at least none in vertex shaders.
+fn check_storage(gpu: &Gpu, name: &str, of_draw: &[Bound]) -> Result<(), Diagnostic> {
+    let names: Vec<&str> =
+        of_draw.iter().filter(|bound| bound.slot.is_stored()).map(|bound| bound.name.as_str()).collect();
+    let flags = gpu.adapter.get_downlevel_capabilities().flags;
+    let has_any = flags.contains(wgpu::DownlevelFlags::VERTEX_STORAGE);
+    let count_max = if has_any { gpu.device.limits().max_storage_buffers_per_shader_stage } else { 0 };
+    if names.len() <= count_max as usize {
+        return Ok(());
     }
-    Ok(wgpu::VertexAttribute { format, offset: offset as u64, shader_location })
+    let read = names.join(", ");
+    let message = format!("`{name}` reads the storage buffers {read}; vertex shaders have {count_max} here");
+    let help = "forbid skin, morph or instancing in [effects], or draw on another device";
+    Err(Diagnostic::error(message).with_note(gpu.description()).with_help(help))
 }
 
 fn check_bindings(
@@ -483,6 +471,13 @@ fn binding_type(bound: &Bound) -> wgpu::BindingType {
                 // Draws share one buffer, each at its own offset.
                 has_dynamic_offset: bound.slot == Slot::Draw,
                 min_binding_size: bound.block.as_ref().and_then(|(size, _)| u64::from(*size).try_into().ok()),
+            }
+        }
+        Slot::JointMatrices | Slot::MorphDeltas | Slot::MorphWeights | Slot::Instances => {
+            wgpu::BindingType::Buffer {
+                ty: wgpu::BufferBindingType::Storage { read_only: true },
+                has_dynamic_offset: false,
+                min_binding_size: None,
             }
         }
         Slot::EnvSkybox | Slot::EnvIrradiance | Slot::EnvSpecular | Slot::EnvSheen => {

@@ -9,13 +9,14 @@ use kiln_gpu::Gpu;
 
 use crate::binding::FrameBinding;
 use crate::camera::OrbitCamera;
-use crate::draw_list::{DrawItem, DrawList};
+use crate::draw_list::{DrawItem, DrawList, front_face};
+use crate::pose::Pose;
 use crate::prepare::Prepared;
-use crate::program::{DEPTH_FORMAT, HDR_FORMAT, OUTPUT_FORMAT, Program, SAMPLE_COUNT};
+use crate::program::{DEPTH_FORMAT, HDR_FORMAT, OUTPUT_FORMAT, Program, Raster, SAMPLE_COUNT};
 use crate::scene_color::{Downsampler, SceneColor};
 use crate::scene_gpu::GpuScene;
 use crate::uniform::FrameValues;
-use crate::view::View;
+use crate::view::{AnimationTime, View};
 
 /// Draws one prepared revision after another; what it shows changes only by [`Renderer::show`].
 #[derive(Debug)]
@@ -37,6 +38,9 @@ struct Shown {
     tonemap: FrameBinding,
     /// If a program reads it.
     scene_color: Option<SceneColor>,
+    pose: Option<Pose>,
+    /// What the device has of the pose; `None` = not known.
+    written: Option<Option<AnimationTime>>,
 }
 
 /// How the scene is drawn: at once, or with a picture of what is opaque between.
@@ -95,6 +99,8 @@ impl Renderer {
             programs: draws.programs.iter().map(|binding| bind(&binding.program, behind)).collect(),
             tonemap: bind(&prepared.tonemap, Some(&self.picture.hdr)),
             scene_color,
+            pose: prepared.scene.as_deref().map(Pose::at_rest),
+            written: None,
             prepared,
         });
     }
@@ -132,19 +138,26 @@ impl Renderer {
 
     /// The camera that `view` asks for.
     pub fn camera(&self, view: &View) -> Option<OrbitCamera> {
-        let of_scene = || Some(OrbitCamera::for_scene(&self.shown()?.scene.as_ref()?.scene, self.aspect()));
+        let of_scene = || {
+            let shown = self.shown.as_ref()?;
+            let bounds = shown.prepared.scene.as_ref()?.scene.bounds;
+            let cameras = &shown.pose.as_ref()?.posed.cameras;
+            Some(OrbitCamera::for_scene(bounds, cameras, view.scene_camera, self.aspect()))
+        };
         view.camera.or_else(of_scene)
     }
 
     /// Draws a frame and submits it; `None` if nothing was ever shown.
-    pub fn render(&self, view: &View) -> Option<wgpu::SubmissionIndex> {
+    pub fn render(&mut self, view: &View) -> Option<wgpu::SubmissionIndex> {
+        self.shown.as_mut()?.take_pose(&self.gpu, view.animation);
         let shown = self.shown.as_ref()?;
         let values = self.frame_values(shown, view);
         for frame in shown.background.iter().chain(&shown.programs).chain([&shown.tonemap]) {
             frame.write(&self.gpu, &values, &view.parameters);
         }
-        if let Some(scene) = shown.prepared.scene.as_ref().map(|scene| &scene.scene) {
-            shown.programs.iter().for_each(|frame| frame.write_lights(&self.gpu, scene, &scene.lights));
+        if let (Some(scene), Some(pose)) = (&shown.prepared.scene, &shown.pose) {
+            let lights = &pose.posed.lights;
+            shown.programs.iter().for_each(|frame| frame.write_lights(&self.gpu, &scene.scene, lights));
         }
         let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let eye = values.camera_position;
@@ -163,7 +176,7 @@ impl Renderer {
     fn frame_values(&self, shown: &Shown, view: &View) -> FrameValues {
         let prepared = &shown.prepared;
         let environment = &prepared.environment;
-        let bounds = prepared.scene.as_ref().and_then(|scene| scene.scene.bounds);
+        let bounds = shown.pose.as_ref().and_then(|pose| pose.bounds);
         let camera = self.camera(view).unwrap_or(OrbitCamera::BACKGROUND_ONLY);
         FrameValues {
             clip_from_world: camera.clip_from_world(bounds, self.aspect()),
@@ -214,16 +227,18 @@ impl Renderer {
             ..Default::default()
         });
         // Opaque draws from near to far, so that depth saves shading; others from far to near.
-        let near_first = |items| sorted(items, |a, b| distance(a, eye).total_cmp(&distance(b, eye)));
-        let far_first = |items| sorted(items, |a, b| distance(b, eye).total_cmp(&distance(a, eye)));
+        let Some(pose) = &shown.pose else { return self.draw_background(&mut pass, shown) };
+        let distance = |item: &DrawItem| pose.draws[item.draw].center.distance_squared(eye);
+        let near_first = |items| visible(items, pose, |a, b| distance(a).total_cmp(&distance(b)));
+        let far_first = |items| visible(items, pose, |a, b| distance(b).total_cmp(&distance(a)));
         let DrawList { opaque, transmissive, blended, .. } = &shown.prepared.draws;
         if stage != Stage::Rest {
-            draw_items(&mut pass, shown, near_first(opaque));
+            self.draw_items(&mut pass, shown, near_first(opaque));
         }
         if stage != Stage::Opaque {
             self.draw_background(&mut pass, shown);
-            draw_items(&mut pass, shown, far_first(transmissive));
-            draw_items(&mut pass, shown, far_first(blended));
+            self.draw_items(&mut pass, shown, far_first(transmissive));
+            self.draw_items(&mut pass, shown, far_first(blended));
         }
     }
 
@@ -238,6 +253,45 @@ impl Renderer {
         frame.set(pass);
         pass.draw(0..3, 0..1);
         pass.set_viewport(0.0, 0.0, width, height, 0.0, 1.0);
+    }
+
+    fn draw_items(&self, pass: &mut wgpu::RenderPass<'_>, shown: &Shown, items: Vec<&DrawItem>) {
+        let (Some(scene), Some(pose)) = (&shown.prepared.scene, &shown.pose) else { return };
+        for item in items {
+            self.draw_item(pass, shown, scene, item, pose.draws[item.draw].mirrored);
+        }
+    }
+
+    fn draw_item(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        shown: &Shown,
+        scene: &GpuScene,
+        item: &DrawItem,
+        mirrored: bool,
+    ) {
+        let raster = Raster { front_face: front_face(mirrored), ..item.raster };
+        if raster == item.raster {
+            pass.set_pipeline(&item.pipeline);
+        } else {
+            // Made when an animation first turns the draw inside out.
+            let program = &shown.prepared.draws.programs[item.program].program;
+            pass.set_pipeline(&program.pipeline(&self.gpu.device, raster));
+        }
+        shown.programs[item.program].set(pass);
+        if let Some(group) = &item.material_group {
+            pass.set_bind_group(1, group, &[]);
+        }
+        if let Some(group) = &item.draw_group {
+            pass.set_bind_group(2, group, item.draw_offset.as_slice());
+        }
+        let mesh = &scene.meshes[item.mesh];
+        pass.set_vertex_buffer(0, mesh.vertices.slice(..));
+        if let Some(influences) = &item.influences {
+            pass.set_vertex_buffer(1, influences.slice(..));
+        }
+        pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
+        pass.draw_indexed(0..mesh.index_count, 0, 0..item.instance_count);
     }
 
     fn draw_tonemap(&self, encoder: &mut wgpu::CommandEncoder, shown: &Shown) {
@@ -257,38 +311,30 @@ impl Renderer {
     }
 }
 
-/// Squared, which sorts alike.
-fn distance(item: &DrawItem, eye: Vec3) -> f32 {
-    item.center.distance_squared(eye)
-}
-
-fn sorted(items: &[DrawItem], order: impl Fn(&DrawItem, &DrawItem) -> Ordering) -> Vec<&DrawItem> {
-    let mut items: Vec<&DrawItem> = items.iter().collect();
+/// What is to be seen, in this order.
+fn visible<'a>(
+    items: &'a [DrawItem],
+    pose: &Pose,
+    order: impl Fn(&DrawItem, &DrawItem) -> Ordering,
+) -> Vec<&'a DrawItem> {
+    let mut items: Vec<&DrawItem> = items.iter().filter(|item| pose.draws[item.draw].visible).collect();
     items.sort_by(|a, b| order(a, b));
     items
 }
 
-fn draw_items(pass: &mut wgpu::RenderPass<'_>, shown: &Shown, items: Vec<&DrawItem>) {
-    let Some(scene) = &shown.prepared.scene else { return };
-    for item in items {
-        draw_item(pass, scene, shown, item);
+impl Shown {
+    /// Poses the scene if it is not posed so already; at rest, and without animations, nothing is written.
+    fn take_pose(&mut self, gpu: &Gpu, time: Option<AnimationTime>) {
+        let (Some(scene), Some(pose)) = (&self.prepared.scene, &mut self.pose) else { return };
+        let time = time.filter(|time| time.index < scene.scene.animations.len());
+        if scene.scene.animations.is_empty() || self.written == Some(time) {
+            return;
+        }
+        pose.update(scene, time);
+        scene.write_deformation(gpu, &pose.posed);
+        self.prepared.draws.write(gpu, scene, pose);
+        self.written = Some(time);
     }
-}
-
-fn draw_item(pass: &mut wgpu::RenderPass<'_>, scene: &GpuScene, shown: &Shown, item: &DrawItem) {
-    let program = &shown.prepared.draws.programs[item.program];
-    let mesh = &scene.meshes[item.mesh];
-    pass.set_pipeline(&item.pipeline);
-    shown.programs[item.program].set(pass);
-    if let Some(group) = &item.material_group {
-        pass.set_bind_group(1, group, &[]);
-    }
-    if let Some(group) = &program.draw_group {
-        pass.set_bind_group(2, group, &[item.draw_offset]);
-    }
-    pass.set_vertex_buffer(0, mesh.vertices.slice(..));
-    pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
-    pass.draw_indexed(0..mesh.index_count, 0, 0..1);
 }
 
 impl Picture {

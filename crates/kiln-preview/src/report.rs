@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use kiln_diagnostic::Diagnostic;
 use kiln_link::{Revision, TargetState};
+use kiln_scene::{Animation, Scene};
 
+use crate::camera::OrbitCamera;
 use crate::keeper::Resolved;
 use crate::parameter::OfferedParameter;
 use crate::target::{ProjectMeta, read_meta};
@@ -21,6 +23,12 @@ pub struct ApplyReport {
     pub scenes: Vec<String>,
     /// Environments to choose from.
     pub envs: Vec<String>,
+    /// The shown scene's animations.
+    pub animations: Vec<OfferedAnimation>,
+    /// Names of the shown scene's material variants.
+    pub variants: Vec<String>,
+    /// Names of the shown scene's cameras that can be looked through.
+    pub cameras: Vec<String>,
     /// What is shown, whatever was asked for.
     pub shown: Selection,
     /// What the authors of the shaders in use offer to be changed, by shader.
@@ -35,7 +43,30 @@ pub struct ApplyReport {
     pub made: Vec<String>,
 }
 
+/// An animation to choose.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OfferedAnimation {
+    /// Its name, or `animation N` where the file has none.
+    pub name: String,
+    /// Time of its last key.
+    pub duration_s: f64,
+}
+
 impl ApplyReport {
+    /// Takes over what a scene offers.
+    pub(crate) fn describe_scene(&mut self, scene: &Scene) {
+        let offered = |(index, animation): (usize, &Animation)| OfferedAnimation {
+            name: match animation.name.as_str() {
+                "" => format!("animation {index}"),
+                name => name.to_owned(),
+            },
+            duration_s: f64::from(animation.duration_s()),
+        };
+        self.animations = scene.animations.iter().enumerate().map(offered).collect();
+        self.variants = scene.variants.clone();
+        self.cameras = OrbitCamera::names(scene);
+    }
+
     /// The resource of a target, after noting what came of it.
     pub(crate) fn take<T>(&mut self, name: &str, resolved: Resolved<T>) -> Option<Arc<T>> {
         self.diagnostics.extend(resolved.diagnostic);

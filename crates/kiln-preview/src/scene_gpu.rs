@@ -2,9 +2,12 @@
 
 use std::collections::HashMap;
 
+use glam::{Mat4, Vec3};
 use kiln_diagnostic::Diagnostic;
 use kiln_gpu::Gpu;
-use kiln_scene::{Image8, Primitive, Sampler, Scene};
+use kiln_scene::{
+    Bounds, Draw, Image8, Influence, MorphDelta, MorphTarget, Posed, Primitive, Sampler, Scene,
+};
 use wgpu::util::{BufferInitDescriptor, DeviceExt as _};
 
 use crate::mip::Average;
@@ -16,6 +19,16 @@ use crate::texture::{create_sampler, create_trilinear_sampler, upload_image};
 pub(crate) struct GpuScene {
     pub scene: Scene,
     pub meshes: Vec<Mesh>,
+    /// Matrices of copies, for each of the scene's draws, then for each of its hidden ones.
+    pub instances: Vec<Option<wgpu::Buffer>>,
+    /// For each of the scene's skins; frames of an animation write them.
+    pub joint_matrices: Vec<Option<wgpu::Buffer>>,
+    /// For each of the scene's morphing draws; frames of an animation write them.
+    pub morph_weights: Vec<Option<wgpu::Buffer>>,
+    /// Stands for joints and copies where there are none.
+    pub neutral_matrix: wgpu::Buffer,
+    /// Stands for what morphs, and by how much.
+    pub neutral_morph: wgpu::Buffer,
     textures: Vec<(wgpu::TextureView, wgpu::Sampler)>,
     neutral_white: wgpu::TextureView,
     neutral_normal: wgpu::TextureView,
@@ -29,6 +42,13 @@ pub(crate) struct Mesh {
     pub vertices: wgpu::Buffer,
     pub indices: wgpu::Buffer,
     pub index_count: u32,
+    /// The joints that vertices hang on.
+    influences: Option<wgpu::Buffer>,
+    vertex_count: usize,
+    /// As `docs/shader-interface.md` lays them out.
+    pub morph_deltas: Option<wgpu::Buffer>,
+    /// What a weight of 1 adds to positions at least and at most, for each weight.
+    pub morph_reach: Vec<Bounds>,
 }
 
 impl GpuScene {
@@ -40,10 +60,20 @@ impl GpuScene {
         let mut scene = kiln_scene::load(glb).map_err(failed)?;
         let meshes = scene.primitives.iter().map(|primitive| Mesh::upload(gpu, name, primitive));
         let meshes = meshes.collect::<Result<_, _>>()?;
+        let instances = all_draws(&scene).map(|draw| upload_instances(gpu, name, draw));
+        let instances = instances.collect::<Result<_, _>>()?;
+        let rest = scene.pose(None, 0.0);
+        let stored = |label, contents| upload_stored(gpu, name, label, contents);
+        let joints = rest.skins.iter().map(|it| stored("joint matrices", bytemuck::cast_slice(it)));
+        let weights = rest.morphs.iter().map(|it| stored("morph weights", bytemuck::cast_slice(it)));
+        let (joint_matrices, morph_weights) =
+            (joints.collect::<Result<_, _>>()?, weights.collect::<Result<_, _>>()?);
         let textures = upload_textures(gpu, &scene);
         for primitive in &mut scene.primitives {
             primitive.vertices = Vec::new();
             primitive.indices = Vec::new();
+            primitive.influences = Vec::new();
+            primitive.targets = Vec::new();
         }
         scene.images = Vec::new();
         let neutral = |label, rgba: [u8; 4]| {
@@ -53,6 +83,12 @@ impl GpuScene {
         Ok(GpuScene {
             scene,
             meshes,
+            instances,
+            joint_matrices,
+            morph_weights,
+            neutral_matrix: neutral_storage(gpu, &Mat4::IDENTITY.to_cols_array()),
+            // One weight of 0 and, read as such, nine deltas.
+            neutral_morph: neutral_storage(gpu, &[0.0]),
             textures,
             neutral_white: neutral("neutral white", [255; 4]),
             // 128 decodes to 0.0039 instead of 0: the nearest code, and shaders leave flat maps out anyway.
@@ -60,6 +96,29 @@ impl GpuScene {
             // The same code leaves the brush 0.2° off the tangent.
             neutral_brush: neutral("neutral brush", [255, 128, 255, 255]),
             neutral_sampler: create_trilinear_sampler(gpu),
+        })
+    }
+
+    /// Writes how skins and morphing draws are deformed.
+    pub fn write_deformation(&self, gpu: &Gpu, posed: &Posed) {
+        for (buffer, matrices) in self.joint_matrices.iter().zip(&posed.skins) {
+            write(gpu, buffer.as_ref(), bytemuck::cast_slice(matrices));
+        }
+        for (buffer, weights) in self.morph_weights.iter().zip(&posed.morphs) {
+            write(gpu, buffer.as_ref(), bytemuck::cast_slice(weights));
+        }
+    }
+
+    /// The joints that a mesh's vertices hang on. Without a skin that is the first, whose matrix is neutral.
+    pub fn influences(&self, gpu: &Gpu, mesh: usize) -> wgpu::Buffer {
+        let Mesh { influences, vertex_count, .. } = &self.meshes[mesh];
+        influences.clone().unwrap_or_else(|| {
+            let on_first = Influence { joints: [0; 4], weights: [1.0, 0.0, 0.0, 0.0] };
+            gpu.device.create_buffer_init(&BufferInitDescriptor {
+                label: Some("neutral influences"),
+                contents: bytemuck::cast_slice(&vec![on_first; *vertex_count]),
+                usage: wgpu::BufferUsages::VERTEX,
+            })
         })
     }
 
@@ -75,25 +134,96 @@ impl GpuScene {
     }
 }
 
+/// What is drawn at rest, then what only animations show: draws are numbered in this order.
+pub(crate) fn all_draws(scene: &Scene) -> impl Iterator<Item = &Draw> {
+    scene.draws.iter().chain(&scene.hidden)
+}
+
 impl Mesh {
     fn upload(gpu: &Gpu, name: &str, primitive: &Primitive) -> Result<Self, Diagnostic> {
+        let limits = gpu.device.limits();
+        let upload =
+            |label, contents, usage| upload(gpu, name, label, contents, usage, limits.max_buffer_size);
         let vertices: &[u8] = bytemuck::cast_slice(&primitive.vertices);
         let indices: &[u8] = bytemuck::cast_slice(&primitive.indices);
-        let limit = gpu.device.limits().max_buffer_size;
-        let largest = vertices.len().max(indices.len());
-        if largest as u64 > limit {
-            let message = format!("a primitive of scene `{name}` needs {largest} bytes in one buffer");
-            return Err(Diagnostic::error(message).with_note(format!("this device takes {limit}")));
-        }
-        let upload = |label, contents, usage| {
-            gpu.device.create_buffer_init(&BufferInitDescriptor { label: Some(label), contents, usage })
-        };
+        let influences: &[u8] = bytemuck::cast_slice::<Influence, u8>(&primitive.influences);
+        let deltas = interleaved(&primitive.targets, primitive.vertices.len());
         Ok(Mesh {
-            vertices: upload("vertices", vertices, wgpu::BufferUsages::VERTEX),
-            indices: upload("indices", indices, wgpu::BufferUsages::INDEX),
+            vertices: upload("vertices", vertices, wgpu::BufferUsages::VERTEX)?,
+            indices: upload("indices", indices, wgpu::BufferUsages::INDEX)?,
             index_count: primitive.indices.len() as u32,
+            vertex_count: primitive.vertices.len(),
+            influences: match influences.is_empty() {
+                true => None,
+                false => Some(upload("influences", influences, wgpu::BufferUsages::VERTEX)?),
+            },
+            morph_deltas: upload_stored(gpu, name, "morph deltas", bytemuck::cast_slice(&deltas))?,
+            morph_reach: primitive.targets.iter().map(reach).collect(),
         })
     }
+}
+
+/// All that is added to a vertex side by side, as it is read.
+fn interleaved(targets: &[MorphTarget], vertex_count: usize) -> Vec<MorphDelta> {
+    let of_vertex = |vertex: usize| targets.iter().map(move |target| target.deltas[vertex]);
+    (0..vertex_count).flat_map(of_vertex).collect()
+}
+
+fn reach(target: &MorphTarget) -> Bounds {
+    let positions = || target.deltas.iter().map(|delta| Vec3::from(delta.position));
+    Bounds { min: positions().fold(Vec3::ZERO, Vec3::min), max: positions().fold(Vec3::ZERO, Vec3::max) }
+}
+
+fn upload_instances(gpu: &Gpu, name: &str, draw: &Draw) -> Result<Option<wgpu::Buffer>, Diagnostic> {
+    let matrices: Vec<Mat4> = draw.instances.iter().map(kiln_scene::Instance::matrix).collect();
+    upload_stored(gpu, name, "instances", bytemuck::cast_slice(&matrices))
+}
+
+/// A storage buffer that frames may write; `None` for nothing.
+fn upload_stored(
+    gpu: &Gpu,
+    scene: &str,
+    label: &str,
+    contents: &[u8],
+) -> Result<Option<wgpu::Buffer>, Diagnostic> {
+    let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+    let limits = gpu.device.limits();
+    // A device without storage buffers refuses the shaders that read them, by name.
+    if contents.is_empty() || limits.max_storage_buffer_binding_size == 0 {
+        return Ok(None);
+    }
+    let bytes_max = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
+    upload(gpu, scene, label, contents, usage, bytes_max).map(Some)
+}
+
+fn write(gpu: &Gpu, buffer: Option<&wgpu::Buffer>, contents: &[u8]) {
+    if let Some(buffer) = buffer {
+        gpu.queue.write_buffer(buffer, 0, contents);
+    }
+}
+
+/// A device without storage buffers has no program that reads it.
+fn neutral_storage(gpu: &Gpu, contents: &[f32]) -> wgpu::Buffer {
+    let has_any = gpu.device.limits().max_storage_buffer_binding_size > 0;
+    let usage = if has_any { wgpu::BufferUsages::STORAGE } else { wgpu::BufferUsages::VERTEX };
+    let contents = bytemuck::cast_slice(contents);
+    gpu.device.create_buffer_init(&BufferInitDescriptor { label: Some("neutral"), contents, usage })
+}
+
+fn upload(
+    gpu: &Gpu,
+    scene: &str,
+    label: &str,
+    contents: &[u8],
+    usage: wgpu::BufferUsages,
+    bytes_max: u64,
+) -> Result<wgpu::Buffer, Diagnostic> {
+    if contents.len() as u64 > bytes_max {
+        let needed = contents.len();
+        let message = format!("scene `{scene}` needs {needed} bytes in one buffer of {label}");
+        return Err(Diagnostic::error(message).with_note(format!("this device takes {bytes_max}")));
+    }
+    Ok(gpu.device.create_buffer_init(&BufferInitDescriptor { label: Some(label), contents, usage }))
 }
 
 /// One device texture for each image and way to average, one sampler for each way to sample.

@@ -120,6 +120,13 @@ pub(crate) enum Slot {
     MaterialTexture(Map),
     MaterialSampler(Map),
     Draw,
+    /// Skin space to world, for each joint.
+    JointMatrices,
+    /// What morph weights add to each vertex.
+    MorphDeltas,
+    MorphWeights,
+    /// Copy to draw, for each copy.
+    Instances,
     /// The author's own parameters.
     Params,
     /// One of the author's own textures.
@@ -128,7 +135,7 @@ pub(crate) enum Slot {
     OwnSampler,
 }
 
-const FIXED: [(Slot, &str); 15] = [
+const FIXED: [(Slot, &str); 19] = [
     (Slot::Frame, "frame"),
     (Slot::EnvSkybox, "env_skybox"),
     (Slot::EnvIrradiance, "env_irradiance"),
@@ -143,8 +150,15 @@ const FIXED: [(Slot, &str); 15] = [
     (Slot::Lights, "lights"),
     (Slot::Material, "material"),
     (Slot::Draw, "draw"),
+    (Slot::JointMatrices, "joint_matrices"),
+    (Slot::MorphDeltas, "morph_deltas"),
+    (Slot::MorphWeights, "morph_weights"),
+    (Slot::Instances, "instances"),
     (Slot::Params, "params"),
 ];
+
+const MATRICES: &str = "read-only storage buffer of array<mat4x4f>";
+const FLOATS: &str = "read-only storage buffer of array<f32>";
 
 impl Slot {
     /// The slot of a shader variable's name.
@@ -169,7 +183,7 @@ impl Slot {
     pub fn group(self) -> u32 {
         match self {
             Slot::Material | Slot::MaterialTexture(_) | Slot::MaterialSampler(_) => 1,
-            Slot::Draw => 2,
+            Slot::Draw | Slot::JointMatrices | Slot::MorphDeltas | Slot::MorphWeights | Slot::Instances => 2,
             Slot::Params | Slot::OwnTexture | Slot::OwnSampler => 3,
             _ => 0,
         }
@@ -179,6 +193,9 @@ impl Slot {
     pub fn accepts(self, kind: &BindingKind) -> bool {
         match (self.expects(), kind) {
             ("uniform", BindingKind::Uniform { .. }) => true,
+            // The smallest size is that of one element.
+            (MATRICES, BindingKind::Storage { read_only: true, size_bytes: 64 })
+            | (FLOATS, BindingKind::Storage { read_only: true, size_bytes: 4 }) => true,
             ("sampler", BindingKind::Sampler { comparison }) => !comparison,
             (expected, BindingKind::Texture { dimension, sample, multisampled: false })
                 if sample == "float" =>
@@ -190,10 +207,17 @@ impl Slot {
         }
     }
 
+    /// Whether it is a storage buffer.
+    pub fn is_stored(self) -> bool {
+        matches!(self.expects(), MATRICES | FLOATS)
+    }
+
     /// What a shader must declare it as.
     pub fn expects(self) -> &'static str {
         match self {
             Slot::Frame | Slot::Lights | Slot::Material | Slot::Draw | Slot::Params => "uniform",
+            Slot::JointMatrices | Slot::Instances => MATRICES,
+            Slot::MorphDeltas | Slot::MorphWeights => FLOATS,
             Slot::EnvSkybox | Slot::EnvIrradiance | Slot::EnvSpecular | Slot::EnvSheen => "texture_cube<f32>",
             Slot::LutGgx
             | Slot::LutCharlie

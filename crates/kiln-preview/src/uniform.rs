@@ -218,11 +218,12 @@ pub(crate) fn parameter_block(
     block
 }
 
-/// Spells WGSL's short names of types out: `vec3f` is `vec3<f32>`.
+/// Spells WGSL's short names of types out: `vec3f` is `vec3<f32>`, `vec4u` is `vec4<u32>`.
 pub(crate) fn long_type_name(ty: &str) -> String {
-    let shortened = ty.starts_with("vec") || ty.starts_with("mat");
-    match ty.strip_suffix('f') {
-        Some(stem) if shortened && !ty.contains('<') => format!("{stem}<f32>"),
+    let shortened = (ty.starts_with("vec") || ty.starts_with("mat")) && !ty.contains('<');
+    match (ty.strip_suffix('f'), ty.strip_suffix('u')) {
+        (Some(stem), _) if shortened => format!("{stem}<f32>"),
+        (_, Some(stem)) if shortened => format!("{stem}<u32>"),
         _ => ty.replace(' ', ""),
     }
 }

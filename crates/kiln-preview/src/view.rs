@@ -10,6 +10,17 @@ pub struct Selection {
     pub scene: Option<String>,
     /// Name of the environment; `None` = the one that the scene names.
     pub env: Option<String>,
+    /// Name of one of the scene's `KHR_materials_variants`; `None` = the materials without any.
+    pub variant: Option<String>,
+}
+
+/// A moment of one of the scene's animations.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AnimationTime {
+    /// Index into [`crate::ApplyReport::animations`]; an index that is not there is the rest pose.
+    pub index: usize,
+    /// Seconds since it began; before its first key and after its last one their values hold.
+    pub time_s: f64,
 }
 
 /// How the selected scene is shown. None of it needs a rebuild.
@@ -25,6 +36,10 @@ pub struct View {
     pub background_blur: f32,
     /// Where the eye is; `None` = the scene's own camera, or one that shows all of it.
     pub camera: Option<OrbitCamera>,
+    /// Which of the scene's own, as an index into [`crate::ApplyReport::cameras`]; it moves as the animation has it.
+    pub scene_camera: usize,
+    /// What plays; `None` = the rest pose.
+    pub animation: Option<AnimationTime>,
     /// Seconds for shaders that move; 0 in headless frames.
     pub time_s: f32,
     /// The parameters that shaders' authors offer.
@@ -40,6 +55,8 @@ impl Default for View {
             environment_intensity: 1.0,
             background_blur: 0.0,
             camera: None,
+            scene_camera: 0,
+            animation: None,
             time_s: 0.0,
             parameters: ParameterValues::default(),
         }

@@ -25,7 +25,7 @@ struct SceneScan {
 }
 
 /// Version of the code behind both the scan and the action.
-const PACK_RECIPE: u32 = 7;
+const PACK_RECIPE: u32 = 8;
 
 /// Adds the actions and targets of one scene and notes the shader variants that it calls for.
 pub(crate) fn plan_scene(

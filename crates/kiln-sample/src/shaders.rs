@@ -29,6 +29,7 @@ pub(crate) const SHADERS: &[(&str, &str)] = &[
     ("shaders/pbr/background.wgsl", include_str!("../../../shaders/pbr/background.wgsl")),
     ("shaders/pbr/base.wgsl", include_str!("../../../shaders/pbr/base.wgsl")),
     ("shaders/pbr/clearcoat.wgsl", include_str!("../../../shaders/pbr/clearcoat.wgsl")),
+    ("shaders/pbr/deform.wgsl", include_str!("../../../shaders/pbr/deform.wgsl")),
     ("shaders/pbr/diffuse_transmission.wgsl", include_str!("../../../shaders/pbr/diffuse_transmission.wgsl")),
     ("shaders/pbr/dispersion.wgsl", include_str!("../../../shaders/pbr/dispersion.wgsl")),
     ("shaders/pbr/interface.wgsl", include_str!("../../../shaders/pbr/interface.wgsl")),

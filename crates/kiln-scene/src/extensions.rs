@@ -65,19 +65,10 @@ pub(crate) fn check_required(root: &Root) -> Result<(), SceneError> {
 
 /// Sentences about the file as a whole.
 pub(crate) fn file_notes(root: &Root) -> Vec<String> {
-    let mut notes = Vec::new();
-    let known =
+    let is_unknown =
         |name: &&String| !SUPPORTED.contains(&name.as_str()) && !NOTED_ELSEWHERE.contains(&name.as_str());
-    for name in root.extensions_used.iter().filter(known) {
-        notes.push(format!("the extension {name} is not supported and was ignored"));
-    }
-    if !root.animations.is_empty() {
-        notes.push(format!("{} animations: the rest pose is drawn", root.animations.len()));
-    }
-    if root.extensions_used.iter().any(|name| name == "KHR_materials_variants") {
-        notes.push("KHR_materials_variants: the default variant is drawn".into());
-    }
-    notes
+    let unknown = root.extensions_used.iter().filter(is_unknown);
+    unknown.map(|name| format!("the extension {name} is not supported and was ignored")).collect()
 }
 
 /// What a drawn material asks for and does not get as the specification says.

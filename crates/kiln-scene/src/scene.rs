@@ -149,6 +149,16 @@ impl Scene {
         effects.extend(draw.effects());
         effects
     }
+
+    /// Index into [`Scene::materials`] of what a draw looks like in a variant, its index into [`Scene::variants`];
+    /// `None` and variants that do not concern it are its primitive's own.
+    pub fn material_of(&self, draw: &Draw, variant: Option<usize>) -> usize {
+        let is_it = |it: &&VariantMaterial| {
+            it.primitive == draw.primitive && variant.is_some_and(|variant| it.variants.contains(&variant))
+        };
+        let other = self.variant_materials.iter().find(is_it);
+        other.map_or(self.primitives[draw.primitive].material, |it| it.material)
+    }
 }
 
 impl Draw {

@@ -455,6 +455,18 @@ pub(crate) struct RenderArgs {
     /// Camera of the glTF file to draw through [default: its first, else one that shows the whole scene]
     #[arg(long)]
     pub(crate) camera: Option<String>,
+    /// Variant of the glTF file's materials (KHR_materials_variants) [default: none]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) material_variant: Option<String>,
+    /// Animation of the glTF file to draw a moment of, by name or number from 0 [default: none, the rest pose]
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub(crate) animation: Option<String>,
+    /// Time of the first frame in the animation, in seconds
+    #[arg(long, default_value_t = 0.0, requires = "animation", value_name = "SECONDS")]
+    pub(crate) time: f64,
+    /// Frames a second of the animation
+    #[arg(long, default_value_t = 30.0, requires = "animation", value_parser = parse_rate)]
+    pub(crate) fps: f64,
     /// Picture size in pixels
     #[arg(long, default_value = "1280x720", value_parser = parse_size)]
     pub(crate) size: [u32; 2],
@@ -539,6 +551,12 @@ fn parse_poll(text: &str) -> Result<std::time::Duration, String> {
     };
     let ms = number.parse::<u64>().ok().and_then(|number| number.checked_mul(unit_ms)).ok_or_else(wrong)?;
     (50..=3_600_000).contains(&ms).then(|| std::time::Duration::from_millis(ms)).ok_or_else(wrong)
+}
+
+/// A number of frames a second.
+fn parse_rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse().ok().filter(|rate: &f64| rate.is_finite() && *rate > 0.0);
+    rate.ok_or_else(|| format!("`{text}` is no number above 0"))
 }
 
 fn parse_size(text: &str) -> Result<[u32; 2], String> {

@@ -4,12 +4,14 @@ use egui::{CentralPanel, Panel, Ui};
 use kiln_diagnostic::Diagnostic;
 use kiln_link::{RevisionTable, Work};
 
+use self::scene::Playback;
 use crate::report::ApplyReport;
 use crate::theme;
 use crate::view::{Selection, View};
 
 mod diagnostics;
 mod parameters;
+mod scene;
 mod side;
 mod timeline;
 mod top;
@@ -56,6 +58,7 @@ pub(crate) struct PanelState {
     pub selection: Selection,
     /// How the user wants to see it.
     pub view: View,
+    pub playback: Playback,
 }
 
 impl PanelState {
@@ -73,6 +76,7 @@ impl PanelState {
             latency_ms: None,
             selection,
             view,
+            playback: Playback::default(),
         }
     }
 
@@ -100,6 +104,7 @@ impl PanelState {
 
 /// Lays the panels out around the picture, which `show_picture` draws in the space left.
 pub(crate) fn show(ui: &mut Ui, state: &mut PanelState, show_picture: impl FnOnce(&mut Ui, &mut PanelState)) {
+    scene::play(ui, state);
     let bar = Panel::top("top").frame(theme::panel_frame());
     bar.show(ui, |ui| top::show(ui, state));
     let timeline = Panel::bottom("timeline").frame(theme::panel_frame()).resizable(true);

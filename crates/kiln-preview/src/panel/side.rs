@@ -4,18 +4,19 @@ use egui::{ComboBox, RichText, ScrollArea, Slider, Ui};
 
 use super::PanelState;
 use crate::theme;
-use crate::view::View;
+use crate::view::{Selection, View};
 
 pub(super) fn show(ui: &mut Ui, state: &mut PanelState) {
     ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
         section(ui, "Scene");
         let shown = state.report.shown.scene.clone();
         if let Some(scene) = pick(ui, "scene", &state.report.scenes, shown.as_deref()) {
-            // The camera and the light that were right for the other scene are not for this one.
-            state.view.camera = None;
-            state.selection.scene = Some(scene);
-            state.selection.env = None;
+            // What was right for the other scene is not for this one: camera, light, variant, animation.
+            (state.view.camera, state.view.scene_camera, state.view.animation) = (None, 0, None);
+            state.selection = Selection { scene: Some(scene), ..Selection::default() };
         }
+        super::scene::show_variants(ui, state);
+        super::scene::show_animations(ui, state);
         section(ui, "Environment");
         let shown = state.report.shown.env.clone();
         if let Some(env) = pick(ui, "environment", &state.report.envs, shown.as_deref()) {
@@ -24,6 +25,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState) {
         show_light(ui, &mut state.view);
         super::parameters::show(ui, &state.report.parameters, &mut state.view.parameters);
         section(ui, "Camera");
+        super::scene::show_cameras(ui, state);
         show_camera(ui, &mut state.view);
         show_notes(ui, state);
         ui.add_space(12.0);
@@ -65,18 +67,21 @@ fn show_light(ui: &mut Ui, view: &mut View) {
         row(ui, "Blur", Slider::new(&mut view.background_blur, 0.0..=1.0).max_decimals(2));
     });
     view.environment_rotation_rad = degrees.to_radians();
+    let View { exposure_ev, environment_rotation_rad, environment_intensity, background_blur, .. } =
+        View::default();
     let neutral = View {
-        camera: view.camera,
-        time_s: view.time_s,
-        parameters: view.parameters.clone(),
-        ..View::default()
+        exposure_ev,
+        environment_rotation_rad,
+        environment_intensity,
+        background_blur,
+        ..view.clone()
     };
     if ui.add_enabled(*view != neutral, egui::Button::new("Reset light")).clicked() {
         *view = neutral;
     }
 }
 
-fn row(ui: &mut Ui, label: &str, slider: Slider<'_>) {
+pub(super) fn row(ui: &mut Ui, label: &str, slider: Slider<'_>) {
     let label = ui.label(label);
     ui.add(slider).labelled_by(label.id);
     ui.end_row();

@@ -74,13 +74,13 @@ fn add_cube(build: &mut Build, name: &str, levels: &[Cube]) {
     build.target(name, "cube", meta, &parts);
 }
 
-fn add_model(build: &mut Build, name: &str, path: &Path) {
+/// Packs a model of the corpus.
+pub(super) fn pack(name: &str, path: &Path) -> Vec<u8> {
     let bytes = std::fs::read(path).expect("the corpus has it");
     let folder = path.parent().expect("it lies in a folder").to_owned();
     let packed =
         kiln_scene::pack(name, &bytes, &mut |uri| std::fs::read(folder.join(uri)).ok().map(Arc::from));
-    let glb = packed.glb.unwrap_or_else(|| panic!("{name}: {:?}", packed.diagnostics));
-    build.shaders_of(&glb).scene(name, "sky", glb.to_vec());
+    packed.glb.unwrap_or_else(|| panic!("{name}: {:?}", packed.diagnostics))
 }
 
 pub(super) fn find(corpus: &Path, name: &str) -> Option<PathBuf> {
@@ -98,7 +98,7 @@ pub(super) fn find(corpus: &Path, name: &str) -> Option<PathBuf> {
     None
 }
 
-fn keep(picture: &RgbaImage, name: &str) {
+pub(super) fn keep(picture: &RgbaImage, name: &str) {
     if let Some(folder) = std::env::var_os("KILN_PREVIEW_OUT") {
         let path = PathBuf::from(folder).join(format!("{name}.png"));
         picture.save(&path).expect("the folder can be written");
@@ -132,7 +132,8 @@ fn real_models_are_drawn_under_a_real_sky() {
             continue;
         };
         build.table.targets.retain(|target, _| !target.starts_with("scene/"));
-        add_model(&mut build, name, &path);
+        let glb = pack(name, &path);
+        build.shaders_of(&glb).scene(name, "sky", glb);
         let mut viewer = HeadlessViewer::new(gpu.clone(), [640, 360]);
         let start = Instant::now();
         let report = viewer.apply(&build.revision());

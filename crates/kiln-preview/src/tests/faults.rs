@@ -227,7 +227,7 @@ fn missing_environment_still_draws_with_a_note() {
     assert!(report.diagnostics.is_empty(), "{report:?}");
     let Revision { table, .. } = build.env("other", [[1.0; 3]; 6]).revision();
     assert!(table.targets.contains_key("env/other/skybox"));
-    let report = viewer.select(Selection { scene: None, env: Some("sky".to_owned()) });
+    let report = viewer.select(Selection { env: Some("sky".to_owned()), ..Selection::default() });
     assert!(report.notes.iter().any(|note| note.contains("no environment `sky`")), "{report:?}");
 }
 

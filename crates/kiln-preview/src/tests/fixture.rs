@@ -164,12 +164,17 @@ impl Build {
         self.target(&format!("scene/{name}"), "scene", meta, &[("glb", glb)])
     }
 
-    /// The shader variants that a scene's materials call for.
+    /// The shader variants that a scene's draws call for, in all its material variants.
     pub fn shaders_of(&mut self, glb: &[u8]) -> &mut Self {
         let scene = kiln_scene::load(glb).expect("what was packed loads");
-        for material in &scene.materials {
-            let features: Vec<&str> = material.effects.iter().map(|effect| effect.name()).collect();
-            self.shaders(&[&features]);
+        let variants = std::iter::once(None).chain((0..scene.variants.len()).map(Some));
+        for variant in variants {
+            for draw in scene.draws.iter().chain(&scene.hidden) {
+                let effects = scene.effects(draw, scene.material_of(draw, variant));
+                let mut features: Vec<&str> = effects.iter().map(|effect| effect.name()).collect();
+                features.sort_unstable();
+                self.shaders(&[&features]);
+            }
         }
         self
     }
@@ -284,7 +289,7 @@ fn png(texel: [u8; 4]) -> Vec<u8> {
 }
 
 /// glTF 2.0, section 4: header, JSON chunk, binary chunk.
-fn glb(document: &Value, binary: &[u8]) -> Vec<u8> {
+pub fn glb(document: &Value, binary: &[u8]) -> Vec<u8> {
     let mut json = document.to_string().into_bytes();
     json.resize(json.len().next_multiple_of(4), b' ');
     let word = |value: usize| (value as u32).to_le_bytes();

@@ -1,6 +1,7 @@
 //! What the preview promises, on whatever adapter there is (lavapipe in CI).
 
 mod corpus;
+mod deform;
 mod effects;
 mod faults;
 mod fixture;

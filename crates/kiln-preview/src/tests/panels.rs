@@ -8,7 +8,7 @@ use kiln_shader::Widget;
 
 use crate::panel::{self, Connection, PanelState};
 use crate::theme;
-use crate::{OfferedParameter, Selection, View};
+use crate::{AnimationTime, OfferedAnimation, OfferedParameter, Selection, View};
 
 fn state() -> PanelState {
     let mut state = PanelState::new("llvmpipe, Vulkan".to_owned(), Selection::default(), View::default());
@@ -17,7 +17,8 @@ fn state() -> PanelState {
     state.report.revision = 7;
     state.report.scenes = vec!["ball".to_owned(), "car".to_owned()];
     state.report.envs = vec!["sky".to_owned(), "studio".to_owned()];
-    state.report.shown = Selection { scene: Some("ball".to_owned()), env: Some("sky".to_owned()) };
+    state.report.shown =
+        Selection { scene: Some("ball".to_owned()), env: Some("sky".to_owned()), variant: None };
     state
 }
 
@@ -106,7 +107,10 @@ fn choosing_another_scene_drops_the_camera_of_the_first() {
     harness.run_steps(4);
     harness.get_by_label("car").click();
     harness.run_steps(4);
-    assert_eq!(harness.state().selection, Selection { scene: Some("car".to_owned()), env: None });
+    assert_eq!(
+        harness.state().selection,
+        Selection { scene: Some("car".to_owned()), ..Selection::default() }
+    );
     assert_eq!(harness.state().view.camera, None);
 }
 
@@ -170,4 +174,71 @@ fn resetting_the_light_leaves_parameters_alone() {
     harness.run_steps(4);
     assert_eq!(harness.state().view.exposure_ev, 0.0);
     assert_eq!(harness.state().view.parameters.of(&wetness), [1.5]);
+}
+
+fn state_with_motion() -> PanelState {
+    let mut state = state();
+    let offered = |name: &str, duration_s| OfferedAnimation { name: name.to_owned(), duration_s };
+    state.report.animations = vec![offered("walk", 60.0), offered("run", 1.0)];
+    state.report.variants = vec!["day".to_owned(), "night".to_owned()];
+    state.report.cameras = vec!["front".to_owned(), "top".to_owned()];
+    state
+}
+
+#[test]
+fn chosen_animation_plays_until_it_is_paused() {
+    let mut harness = harness(state_with_motion());
+    assert!(harness.query_by_label("Pause").is_none(), "the rest pose has nothing to pause");
+    harness.get_by_label("animation").click();
+    harness.run_steps(4);
+    harness.get_by_label("walk").click();
+    harness.run_steps(4);
+    let time = |harness: &Harness<'_, PanelState>| harness.state().view.animation.expect("it plays");
+    let early = time(&harness);
+    assert_eq!(early.index, 0);
+    harness.run_steps(4);
+    assert!(time(&harness).time_s > early.time_s);
+    harness.get_by_label("Pause").click();
+    harness.run_steps(2);
+    let paused = time(&harness);
+    harness.run_steps(4);
+    assert_eq!(time(&harness), paused);
+    harness.key_press(egui::Key::Space);
+    harness.run_steps(4);
+    assert!(harness.state().playback.is_playing);
+}
+
+#[test]
+fn animation_that_does_not_loop_stops_at_its_end_and_plays_again() {
+    let mut state = state_with_motion();
+    state.view.animation = Some(AnimationTime { index: 1, time_s: 0.999 });
+    state.playback.is_playing = true;
+    state.playback.is_looping = false;
+    let mut harness = harness(state);
+    harness.run_steps(4);
+    assert_eq!(harness.state().view.animation, Some(AnimationTime { index: 1, time_s: 1.0 }));
+    assert!(!harness.state().playback.is_playing);
+    harness.get_by_label("Play").click();
+    harness.run_steps(2);
+    assert!(harness.state().view.animation.is_some_and(|time| time.time_s < 0.9));
+}
+
+#[test]
+fn variants_and_cameras_are_chosen_and_belong_to_their_scene() {
+    let mut state = state_with_motion();
+    state.view.camera = Some(crate::OrbitCamera::BACKGROUND_ONLY);
+    let mut harness = harness(state);
+    for (list, choice) in [("material variant", "night"), ("camera", "top")] {
+        harness.get_by_role_and_label(egui::accesskit::Role::ComboBox, list).click();
+        harness.run_steps(4);
+        harness.get_by_label(choice).click();
+        harness.run_steps(4);
+    }
+    assert_eq!(harness.state().selection.variant.as_deref(), Some("night"));
+    assert_eq!((harness.state().view.camera, harness.state().view.scene_camera), (None, 1));
+    harness.get_by_label("scene").click();
+    harness.run_steps(4);
+    harness.get_by_label("car").click();
+    harness.run_steps(4);
+    assert_eq!((harness.state().selection.variant.as_deref(), harness.state().view.scene_camera), (None, 0));
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::{Files, compiled, set};
 use crate::{BindingKind, Compiled, Program, Reflection, scan};
 
-pub(super) const FEATURES: [&str; 17] = [
+pub(super) const FEATURES: [&str; 20] = [
     "alpha_blend",
     "alpha_mask",
     "anisotropy",
@@ -13,11 +13,14 @@ pub(super) const FEATURES: [&str; 17] = [
     "diffuse_transmission",
     "dispersion",
     "emission",
+    "instancing",
     "iridescence",
+    "morph",
     "normal_map",
     "occlusion",
     "punctual_lights",
     "sheen",
+    "skin",
     "specular",
     "transmission",
     "unlit",
@@ -26,14 +29,16 @@ pub(super) const FEATURES: [&str; 17] = [
 ];
 
 /// Names of the interface that belong to one feature, by what they start with.
-const OWNED: [(&str, &str); 25] = [
+const OWNED: [(&str, &str); 30] = [
     ("alpha_mask", "alpha_cutoff"),
     ("anisotropy", "anisotropy_"),
     ("clearcoat", "clearcoat_"),
     ("diffuse_transmission", "diffuse_transmission_"),
     ("dispersion", "dispersion"),
     ("emission", "emissive_"),
+    ("instancing", "instances"),
     ("iridescence", "iridescence_"),
+    ("morph", "morph_"),
     ("normal_map", "normal_texture"),
     ("normal_map", "normal_scale"),
     ("normal_map", "normal_uv_"),
@@ -43,6 +48,9 @@ const OWNED: [(&str, &str); 25] = [
     ("punctual_lights", "lights"),
     ("punctual_lights", "Punctual"),
     ("sheen", "sheen_"),
+    ("skin", "joint_matrices"),
+    ("skin", "joints"),
+    ("skin", "weights"),
     ("specular", "specular_factor"),
     ("specular", "specular_color_"),
     ("transmission", "scene_color"),

@@ -10,7 +10,7 @@ use kiln_diagnostic::{Diagnostic, has_errors};
 use kiln_gpu::Gpu;
 use kiln_image::sheet::{Shot, shot_sheet};
 use kiln_link::Revision;
-use kiln_preview::{ApplyReport, Assignment, HeadlessViewer, Selection};
+use kiln_preview::{AnimationTime, ApplyReport, Assignment, HeadlessViewer, Selection};
 use kiln_shader::Widget;
 use serde::Serialize;
 
@@ -28,7 +28,8 @@ pub(crate) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     let mut session = Session::new(args, HeadlessViewer::new(gpu, args.size), &revision)?;
     for scene in chosen(&args.scene, &session.offered.scenes, "scene")? {
         for env in chosen(&args.env, &session.offered.envs, "environment")? {
-            session.draw_selection(&revision, Selection { scene: scene.clone(), env })?;
+            let variant = args.material_variant.clone();
+            session.draw_selection(&revision, Selection { scene: scene.clone(), env, variant })?;
         }
     }
     session.finish(&revision)
@@ -123,8 +124,17 @@ impl<'a> Session<'a> {
             applied.notes.iter().filter(|note| !self.notes.contains(note)).cloned().collect::<Vec<_>>(),
         );
         self.diagnostics.extend(applied.diagnostics.iter().cloned());
-        self.viewer.view.camera = match &self.args.camera {
-            Some(name) => Some(self.camera(name)?),
+        if let Some(name) = self.args.material_variant.as_ref().filter(|_| applied.shown.variant.is_none()) {
+            return Err(unknown("material variant", name, &applied.variants));
+        }
+        self.viewer.view.scene_camera = match &self.args.camera {
+            Some(name) => {
+                place_of(name, &applied.cameras).ok_or_else(|| unknown("camera", name, &applied.cameras))?
+            }
+            None => 0,
+        };
+        self.viewer.view.animation = match &self.args.animation {
+            Some(asked) => Some(AnimationTime { index: animation(asked, &applied)?, time_s: self.args.time }),
             None => None,
         };
         match &self.args.vary {
@@ -141,23 +151,17 @@ impl<'a> Session<'a> {
         }
     }
 
-    fn camera(&self, name: &str) -> anyhow::Result<kiln_preview::OrbitCamera> {
-        let cameras = self.viewer.cameras();
-        let found = cameras.iter().find(|(known, _)| known == name).map(|(_, camera)| *camera);
-        found.ok_or_else(|| {
-            let known: Vec<&str> = cameras.iter().map(|(name, _)| name.as_str()).collect();
-            let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
-            place::WrongInput(format!("the scene has no camera `{name}`\n  help: it has {known}")).into()
-        })
-    }
-
     fn draw_frames(&mut self, applied: &ApplyReport, choice: Option<&str>) -> anyhow::Result<()> {
-        let turned = self.viewer.view.environment_rotation_rad;
+        let before = self.viewer.view.clone();
         for frame in 1..=self.args.frames {
             self.draw_frame(applied, choice, frame)?;
             self.viewer.view.environment_rotation_rad += self.args.turn.to_radians();
+            if let Some(time) = &mut self.viewer.view.animation {
+                // From the first frame on, so that no rounding adds up.
+                time.time_s = self.args.time + frame as f64 / self.args.fps;
+            }
         }
-        self.viewer.view.environment_rotation_rad = turned;
+        self.viewer.view = before;
         Ok(())
     }
 
@@ -228,6 +232,22 @@ impl<'a> Session<'a> {
         }
         Ok(if has_errors(facts.diagnostics) { ExitCode::from(INPUT_IS_WRONG) } else { ExitCode::SUCCESS })
     }
+}
+
+fn place_of(name: &str, names: &[String]) -> Option<usize> {
+    names.iter().position(|known| known == name)
+}
+
+/// The animation of that name, else of that number.
+fn animation(asked: &str, applied: &ApplyReport) -> anyhow::Result<usize> {
+    let names: Vec<String> = applied.animations.iter().map(|animation| animation.name.clone()).collect();
+    let by_number = || asked.parse().ok().filter(|index: &usize| *index < names.len());
+    place_of(asked, &names).or_else(by_number).ok_or_else(|| unknown("animation", asked, &names))
+}
+
+fn unknown(what: &str, name: &str, known: &[String]) -> anyhow::Error {
+    let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+    place::WrongInput(format!("the scene has no {what} `{name}`\n  help: it has {known}")).into()
 }
 
 /// The names that a parameter with a list offers.
