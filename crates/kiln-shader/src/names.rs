@@ -114,7 +114,7 @@ pub const MATERIAL_TEXTURES: [&str; 19] = [
 ];
 
 /// Textures and samplers of the frame.
-pub const FRAME_RESOURCES: [&str; 9] = [
+pub const FRAME_RESOURCES: [&str; 10] = [
     "env_skybox",
     "env_irradiance",
     "env_specular",
@@ -122,6 +122,7 @@ pub const FRAME_RESOURCES: [&str; 9] = [
     "lut_ggx",
     "lut_charlie",
     "hdr_color",
+    "scene_color",
     "env_sampler",
     "lut_sampler",
 ];
@@ -154,11 +155,11 @@ pub fn group_of_resource(name: &str) -> Group {
 }
 
 /// The sampler that goes with a texture of a language where both are one. All environment maps share one,
-/// and so do tables; `hdr_color` is read by the same clamped sampler as they.
+/// and so do tables; pictures are read by the same clamped sampler as they.
 pub fn sampler_of(texture: &str) -> String {
     if texture.starts_with("env_") {
         "env_sampler".to_owned()
-    } else if texture.starts_with("lut_") || texture == "hdr_color" {
+    } else if texture.starts_with("lut_") || ["hdr_color", "scene_color"].contains(&texture) {
         "lut_sampler".to_owned()
     } else {
         format!("{}_sampler", texture.strip_suffix("_texture").unwrap_or(texture))

@@ -53,6 +53,10 @@ fn names_have_the_groups_of_the_document() {
     let resources =
         ["env_specular", "hdr_color", "sheen_color_texture", "wood_texture", "draw"].map(group_of_resource);
     assert_eq!(resources, [Group::Frame, Group::Frame, Group::Material, Group::Params, Group::Draw]);
-    let samplers = ["env_skybox", "lut_ggx", "hdr_color", "normal_texture", "noise"].map(sampler_of);
-    assert_eq!(samplers, ["env_sampler", "lut_sampler", "lut_sampler", "normal_sampler", "noise_sampler"]);
+    let samplers =
+        ["env_skybox", "lut_ggx", "hdr_color", "scene_color", "normal_texture", "noise"].map(sampler_of);
+    assert_eq!(
+        samplers,
+        ["env_sampler", "lut_sampler", "lut_sampler", "lut_sampler", "normal_sampler", "noise_sampler"]
+    );
 }
