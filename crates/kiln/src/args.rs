@@ -554,6 +554,7 @@ fn parse_poll(text: &str) -> Result<std::time::Duration, String> {
 }
 
 /// A number of frames a second.
+#[cfg(feature = "preview")]
 fn parse_rate(text: &str) -> Result<f64, String> {
     let rate = text.parse().ok().filter(|rate: &f64| rate.is_finite() && *rate > 0.0);
     rate.ok_or_else(|| format!("`{text}` is no number above 0"))

@@ -58,7 +58,7 @@ fn order_of_pictures_does_not_matter_and_worse_is_more() {
 fn chequers_too_fine_to_see_are_grey() {
     // Encoded so that the mean of the two in linear light is the grey's.
     let chequers: Vec<u8> = (0..WIDTH * HEIGHT)
-        .flat_map(|at| [if (at % WIDTH + at / WIDTH) % 2 == 0 { 188 } else { 0 }; 3])
+        .flat_map(|at| [if (at % WIDTH + at / WIDTH).is_multiple_of(2) { 188 } else { 0 }; 3])
         .collect();
     let grey = plain([137; 3]);
     let by = |pixels_per_degree| -> f32 {

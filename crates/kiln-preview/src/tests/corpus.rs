@@ -54,7 +54,7 @@ pub(super) fn bake_panorama(build: &mut Build, name: &str, panorama: &Panorama, 
     };
     let specular: Vec<Cube> = std::iter::once(mirror).chain((1..levels).map(level)).collect();
     add_cube(build, &format!("env/{name}/specular"), &specular);
-    let irradiance = kiln_bake::irradiance(&analysis, 16, Cancel::NEVER).expect(WANTED);
+    let irradiance = kiln_bake::irradiance(&analysis, 64, Cancel::NEVER).expect(WANTED);
     add_cube(build, &format!("env/{name}/irradiance"), &[irradiance.cube]);
     add_cube(build, &format!("env/{name}/skybox"), &skybox(256));
 }

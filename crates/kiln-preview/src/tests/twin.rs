@@ -23,7 +23,7 @@ const WIDTH: usize = 128;
 /// Root of the mean squared difference, relative to that of the twin, at roughness that a level of the chain has.
 const RMS_MAX: f64 = 0.01;
 /// The same on levels of faces of 8 texels and fewer, whatever these hold: bilinear reads between them.
-const RMS_MAX_COARSE: f64 = 0.02;
+const RMS_MAX_COARSE: f64 = 0.03;
 const BETWEEN: f64 = 4.5 / 6.0;
 /// The same half-way between two of seven levels, where a mean of two lobes stands for the one between them: what no exactness of
 /// the levels buys.
@@ -177,7 +177,7 @@ fn spheres_under_real_panoramas_are_those_of_their_twin() {
             assert!(found > 0.02, "the check does not see another surface: {found}");
         }
     }
-    say(&format!("worst: {:.2} of what is allowed", worst));
+    say(&format!("worst: {worst:.2} of what is allowed"));
 }
 
 /// The last scene drawn again, beside a twin of another surface.
