@@ -64,6 +64,8 @@ fn what_a_project_does_not_have_is_named_with_what_it_has() {
         (["--scene", "bals"], "no scene `bals`\n  help: it has balls"),
         (["--env", "moon"], "no environment `moon`"),
         (["--camera", "Front"], "no camera `Front`"),
+        (["--animation", "Walk"], "no animation `Walk`\n  help: it has none"),
+        (["--material-variant", "red"], "no material variant `red`\n  help: it has none"),
         (
             ["--vary", "tone_maper"],
             "no shader in use offers `tone_maper`\n  help: to vary: tonemap.tone_mapper",

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use kiln_link::{Client, ClientEvent, FrameReport};
 
+use crate::view::Selection;
 use crate::worker::unix_ms;
 
 /// How often a finished frame is looked for while the daemon waits for one; its times are taken elsewhere.
@@ -26,6 +27,7 @@ pub(crate) struct Heard {
 pub(crate) struct Connection {
     heard: Receiver<Heard>,
     reports: Option<Sender<FrameReport>>,
+    wants: Sender<Vec<String>>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -34,16 +36,23 @@ impl Connection {
     pub fn open(socket: PathBuf, wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
         let (sender, heard) = channel();
         let (reports, reported) = channel();
+        let (wants, wanted) = channel();
         let thread = std::thread::Builder::new().name("link".into());
         let thread = thread.spawn(move || {
-            forward(&Client::connect(socket, "preview, window"), &sender, &reported, wake);
+            forward(&Client::connect(socket, "preview, window"), &sender, &Told { reported, wanted }, wake);
         })?;
-        Ok(Connection { heard, reports: Some(reports), thread: Some(thread) })
+        Ok(Connection { heard, reports: Some(reports), wants, thread: Some(thread) })
     }
 
     /// The oldest event not yet taken.
     pub fn next(&self) -> Option<Heard> {
         self.heard.try_recv().ok()
+    }
+
+    /// Tells the daemon what is shown: its contents come first.
+    pub fn want(&self, selection: &Selection) {
+        // The thread ends only with the window.
+        drop(self.wants.send(selection.targets()));
     }
 
     /// Where finished frames are reported.
@@ -62,9 +71,15 @@ impl Drop for Connection {
     }
 }
 
+/// What the window has to say.
+struct Told {
+    reported: Receiver<FrameReport>,
+    wanted: Receiver<Vec<String>>,
+}
+
 /// Passes events on and reports back until the window is gone. The client's receiver cannot be shared between
 /// threads, so one thread serves both directions, and polls for reports only while one is due.
-fn forward(client: &Client, heard: &Sender<Heard>, reported: &Receiver<FrameReport>, wake: impl Fn()) {
+fn forward(client: &Client, heard: &Sender<Heard>, told: &Told, wake: impl Fn()) {
     let mut newest_sent = 0;
     let mut newest_reported = 0;
     loop {
@@ -82,8 +97,11 @@ fn forward(client: &Client, heard: &Sender<Heard>, reported: &Receiver<FrameRepo
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => return,
         }
+        if let Some(targets) = told.wanted.try_iter().last() {
+            client.want(targets);
+        }
         loop {
-            match reported.try_recv() {
+            match told.reported.try_recv() {
                 Ok(report) => {
                     newest_reported = report.revision;
                     client.report_frame(report);

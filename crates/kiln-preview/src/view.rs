@@ -23,6 +23,14 @@ pub struct AnimationTime {
     pub time_s: f64,
 }
 
+impl Selection {
+    /// The targets, or groups of them, that it names.
+    pub(crate) fn targets(&self) -> Vec<String> {
+        let scene = self.scene.iter().map(|name| format!("scene/{name}"));
+        scene.chain(self.env.iter().map(|name| format!("env/{name}"))).collect()
+    }
+}
+
 /// How the selected scene is shown. None of it needs a rebuild.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {

@@ -119,6 +119,9 @@ impl Window {
         }
         if let Some(ready) = self.worker.take() {
             let is_new = ready.prepared.report.revision != self.panels.report.revision;
+            if ready.prepared.report.shown != self.panels.report.shown {
+                self.connection.want(&ready.prepared.report.shown);
+            }
             self.panels.report = ready.prepared.report.clone();
             self.picture.replace(ready, is_new);
         }
