@@ -21,7 +21,7 @@ fn material(metallic: f32, roughness: f32, extensions: Value) -> Value {
 }
 
 /// The sphere's picture with the variant that its values call for.
-fn picture(sphere: &Sphere, faces: [[f32; 3]; 6]) -> Option<RgbaImage> {
+pub(super) fn picture(sphere: &Sphere, faces: [[f32; 3]; 6]) -> Option<RgbaImage> {
     let mut viewer = HeadlessViewer::new(gpu()?, [320, 180]);
     let glb = sphere.glb();
     let mut build = Build::new();

@@ -3,8 +3,9 @@
 use image::{Rgba, RgbaImage};
 use serde_json::{Value, json};
 
+use super::effects::picture;
 use super::fixture::{Build, SIX_COLORS, Sphere, gpu};
-use super::frames::{FRONT, STEPS_MAX};
+use super::frames::STEPS_MAX;
 use crate::HeadlessViewer;
 
 /// Glass of this index that reflects nothing.
@@ -36,17 +37,6 @@ fn before_a_lamp(glass: Value, faces: [[f32; 3]; 6]) -> Option<RgbaImage> {
         ..Sphere::default()
     };
     picture(&sphere, faces)
-}
-
-fn picture(sphere: &Sphere, faces: [[f32; 3]; 6]) -> Option<RgbaImage> {
-    let mut viewer = HeadlessViewer::new(gpu()?, [320, 180]);
-    let glb = sphere.glb();
-    let mut build = Build::new();
-    build.shaders_of(&glb).lut().env("sky", faces).scene("ball", "sky", glb);
-    let report = viewer.apply(&build.revision());
-    assert_eq!(report.diagnostics, vec![]);
-    viewer.view.camera = Some(FRONT);
-    Some(viewer.render().expect("the device reads back"))
 }
 
 fn is_red([red, green, blue, _]: [u8; 4]) -> bool {
