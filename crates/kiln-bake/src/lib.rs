@@ -11,6 +11,8 @@
 //! maps hold E/π; `f64` inside, `f32` in results. Panoramas are expected to be finite and not negative:
 //! `kiln_image` checks and repairs texels. Equal inputs give equal bytes for any number of threads.
 //!
+//! [`split_sum_radiance`] and [`PathTracer`] tell what the shading model costs that reads the maps.
+//!
 //! Every step takes a [`Cancel`] last: soon after it is set the step returns [`Cancelled`]. [`memory`] says what the
 //! steps need.
 //!
@@ -25,6 +27,7 @@ mod encode;
 mod law;
 mod measure;
 pub mod memory;
+mod model;
 mod overlap;
 mod panorama;
 mod patch;
@@ -46,6 +49,7 @@ pub use dering::{Deringed, dering};
 pub use encode::{EncodedLevel, TexelFormat, decode_level, encode_level, scale_log2};
 pub use law::{LawError, RoughnessLaw, roughness_of_level};
 pub use measure::{BruteForce, Measured};
+pub use model::{PathTracer, Surface, Traced, split_sum_radiance};
 pub use panorama::panorama_of_cube;
 pub use prefilter::{ALPHA_MIN, Accuracy, Prefiltered, irradiance, sheen_level, specular_level};
 pub use reference::reference_radiance;

@@ -8,6 +8,7 @@ mod encodings;
 mod environments;
 mod laws;
 mod measure;
+mod model;
 mod recipes;
 mod sun;
 mod tables;

@@ -123,6 +123,11 @@ impl Gpu {
         self.adapter.get_info().device_type == wgpu::DeviceType::Cpu
     }
 
+    /// Bytes of device memory that resources have now; `None` where the driver's allocator does not say.
+    pub fn memory_bytes(&self) -> Option<u64> {
+        Some(self.device.generate_allocator_report()?.total_allocated_bytes)
+    }
+
     /// Whether textures of 32-bit floats can be filtered.
     pub fn filters_float32(&self) -> bool {
         self.device.features().contains(wgpu::Features::FLOAT32_FILTERABLE)

@@ -22,6 +22,7 @@ pub use headless::HeadlessViewer;
 pub use parameter::{OfferedParameter, ParameterValues};
 pub use report::{ApplyReport, OfferedAnimation};
 pub use run::{HeadlessOptions, HeadlessReport, run_headless};
+pub use upload::Uploaded;
 pub use view::{AnimationTime, Selection, View};
 pub use window::{WindowOptions, run_window};
 
@@ -55,6 +56,7 @@ mod tests;
 mod texture;
 mod theme;
 mod uniform;
+mod upload;
 mod vertex_input;
 mod view;
 mod window;

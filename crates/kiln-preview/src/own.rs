@@ -14,6 +14,7 @@ use crate::program::Bound;
 use crate::slot::Slot;
 use crate::texture::{create_sampler, upload_image};
 use crate::uniform::parameter_block;
+use crate::upload::Uploader;
 
 /// The textures that come with a shader, by the names of its variables.
 #[derive(Debug)]
@@ -52,8 +53,13 @@ const PART: &str = "texture.";
 
 impl OwnTextures {
     /// Uploads the textures of the target `name`.
-    pub fn upload(gpu: &Gpu, revision: &Revision, name: &str, srgb: &[String]) -> Result<Self, Diagnostic> {
-        let mut textures = OwnTextures::none(gpu);
+    pub fn upload(
+        uploader: &Uploader,
+        revision: &Revision,
+        name: &str,
+        srgb: &[String],
+    ) -> Result<Self, Diagnostic> {
+        let mut textures = OwnTextures::none(&uploader.gpu);
         let parts = revision.table.targets.get(name).map_or(&[][..], |target| &target.parts);
         for variable in parts.iter().filter_map(|part| part.name.strip_prefix(PART)) {
             let Some(file) = revision.part(name, &format!("{PART}{variable}")) else { continue };
@@ -62,7 +68,7 @@ impl OwnTextures {
             })?;
             let is_srgb = srgb.iter().any(|other| other == variable);
             let average = if is_srgb { Average::Srgb } else { Average::Linear };
-            textures.views.insert(variable.to_owned(), upload_image(gpu, variable, &image, average));
+            textures.views.insert(variable.to_owned(), upload_image(uploader, variable, &image, average));
         }
         Ok(textures)
     }

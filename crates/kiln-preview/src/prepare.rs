@@ -19,6 +19,7 @@ use crate::report::{ApplyReport, choose, describe};
 use crate::scene_gpu::GpuScene;
 use crate::target::{CubeMeta, LutMeta, ProjectMeta, Role, SceneMeta, ShaderMeta, read_meta};
 use crate::texture::{CubeTexture, LutTexture, create_trilinear_sampler};
+use crate::upload::Uploader;
 use crate::view::Selection;
 
 /// The environment as shaders read it.
@@ -50,7 +51,7 @@ pub(crate) struct Prepared {
 /// Makes [`Prepared`]s and keeps what several of them share.
 #[derive(Debug)]
 pub(crate) struct Preparer {
-    gpu: Gpu,
+    uploader: Uploader,
     cubes: Keeper<CubeTexture>,
     luts: Keeper<LutTexture>,
     scenes: Keeper<GpuScene>,
@@ -66,23 +67,30 @@ pub(crate) struct Preparer {
 impl Preparer {
     /// Makes the neutral resources.
     pub fn new(gpu: &Gpu) -> Self {
+        let uploader = Uploader::new(gpu);
         let (tonemap, _) = gpu.catch_errors(|| {
             let (wgsl, reflection) = (neutral::TONEMAP_WGSL, neutral::tonemap_reflection());
             let own = OwnTextures::none(gpu);
             Program::new(gpu, "built-in tonemap", Role::Tonemap, (wgsl, &reflection), &own)
         });
         Preparer {
-            gpu: gpu.clone(),
             cubes: Keeper::default(),
             luts: Keeper::default(),
             scenes: Keeper::default(),
             programs: Keeper::default(),
             parameters: ParameterValues::default(),
-            neutral_cube: Arc::new(CubeTexture::neutral(gpu)),
-            neutral_lut: Arc::new(LutTexture::neutral(gpu)),
+            neutral_cube: Arc::new(CubeTexture::neutral(&uploader)),
+            neutral_lut: Arc::new(LutTexture::neutral(&uploader)),
             neutral_tonemap: tonemap.ok().map(Arc::new),
             sampler: create_trilinear_sampler(gpu),
+            uploader,
         }
+    }
+
+    /// Runs `work` whenever the device is done with a piece of what it needs.
+    #[cfg(test)]
+    pub fn after_piece(&mut self, work: impl Fn() + Send + 'static) {
+        self.uploader.after_piece(work);
     }
 
     /// Makes everything that drawing the selection needs, or takes it over from earlier, with these values of overrides. `None`
@@ -105,9 +113,9 @@ impl Preparer {
         let environment = self.environment(revision, env.as_deref(), has_cloth, &mut report);
         let tonemap = self.full_screen_program(revision, Role::Tonemap, &mut report);
         let tonemap = tonemap.or_else(|| self.neutral_tonemap.clone())?;
-        let tonemap_pipeline = tonemap.pipeline(&self.gpu.device, Raster::FULL_SCREEN);
+        let tonemap_pipeline = tonemap.pipeline(&self.uploader.gpu.device, Raster::FULL_SCREEN);
         let background = self.full_screen_program(revision, Role::Background, &mut report).map(|program| {
-            let pipeline = program.pipeline(&self.gpu.device, Raster::FULL_SCREEN);
+            let pipeline = program.pipeline(&self.uploader.gpu.device, Raster::FULL_SCREEN);
             (pipeline, program)
         });
         let shader = meta.map_or_else(|| "pbr".to_owned(), |meta| meta.shader);
@@ -126,6 +134,7 @@ impl Preparer {
         let of_draws = draws.programs.iter().map(|binding| &binding.program);
         let of_background = background.iter().map(|(_, program)| program);
         let is_animated = of_draws.chain(of_background).chain([&tonemap]).any(|program| program.reads_time());
+        report.uploaded = self.uploader.finish();
         Some(Prepared {
             report,
             environment,
@@ -141,12 +150,12 @@ impl Preparer {
     fn scene(&mut self, revision: &Revision, name: &str, report: &mut ApplyReport) -> Option<Arc<GpuScene>> {
         let target_name = format!("scene/{name}");
         let target = revision.table.targets.get(&target_name)?;
-        let gpu = &self.gpu;
+        let (uploader, gpu) = (&self.uploader, &self.uploader.gpu);
         let resolved = self.scenes.resolve(gpu, &target_name, Key::of(target), || {
             let glb = revision.part(&target_name, "glb");
             let glb =
                 glb.ok_or_else(|| Diagnostic::error(format!("target `{target_name}` has no part `glb`")))?;
-            GpuScene::upload(gpu, name, glb)
+            GpuScene::upload(uploader, name, glb)
         });
         let scene = report.take(&target_name, resolved);
         if let Some(scene) = &scene {
@@ -198,10 +207,10 @@ impl Preparer {
             report.notes.push(absent(name, revision, last_good.is_some()));
             return last_good.unwrap_or_else(|| Arc::clone(&self.neutral_cube));
         };
-        let gpu = &self.gpu;
+        let (uploader, gpu) = (&self.uploader, &self.uploader.gpu);
         let resolved = self.cubes.resolve(gpu, name, Key::of(target), || {
             let meta: CubeMeta = read_meta(name, target, "cube")?;
-            CubeTexture::upload(gpu, name, target, revision, &meta)
+            CubeTexture::upload(uploader, name, target, revision, &meta)
         });
         let cube = report.take(name, resolved);
         let cube = cube.unwrap_or_else(|| Arc::clone(&self.neutral_cube));
@@ -218,13 +227,13 @@ impl Preparer {
             report.notes.push(absent(name, revision, last_good.is_some()));
             return last_good.unwrap_or_else(|| Arc::clone(&self.neutral_lut));
         };
-        let gpu = &self.gpu;
+        let (uploader, gpu) = (&self.uploader, &self.uploader.gpu);
         let resolved = self.luts.resolve(gpu, name, Key::of(target), || {
             let meta: LutMeta = read_meta(name, target, "lut")?;
             let texels = revision.part(name, "texels");
             let texels =
                 texels.ok_or_else(|| Diagnostic::error(format!("target `{name}` has no part `texels`")))?;
-            LutTexture::upload(gpu, name, texels, &meta)
+            LutTexture::upload(uploader, name, texels, &meta)
         });
         report.take(name, resolved).unwrap_or_else(|| Arc::clone(&self.neutral_lut))
     }
@@ -254,7 +263,7 @@ impl Preparer {
         report: &mut ApplyReport,
     ) -> Option<Arc<Program>> {
         let target = revision.table.targets.get(name)?;
-        let gpu = &self.gpu;
+        let (uploader, gpu) = (&self.uploader, &self.uploader.gpu);
         let resolved = self.programs.resolve(gpu, name, Key::of(target), || {
             let meta: ShaderMeta = read_meta(name, target, "shader")?;
             if meta.role != role {
@@ -264,7 +273,7 @@ impl Preparer {
                 )));
             }
             let (wgsl, reflection) = read_shader(revision, name)?;
-            let own = OwnTextures::upload(gpu, revision, name, &meta.srgb_textures)?;
+            let own = OwnTextures::upload(uploader, revision, name, &meta.srgb_textures)?;
             let program = Program::new(gpu, name, role, (&wgsl, &reflection), &own)?;
             // Made here, because only a pipeline shows whether module and layout fit.
             program.pipeline(&gpu.device, Raster::of_role(role));
@@ -278,7 +287,7 @@ impl Preparer {
     /// Gives a program that will be drawn with the overrides' values, and offers its parameters.
     fn adopt(&self, program: Option<&Program>, report: &mut ApplyReport) {
         let Some(program) = program else { return };
-        report.diagnostics.extend(program.specialise(&self.gpu, &self.parameters).err());
+        report.diagnostics.extend(program.specialise(&self.uploader.gpu, &self.parameters).err());
         report.notes.extend(program.notes.iter().cloned());
         for parameter in &program.parameters {
             // Variants of a shader share their parameters.
@@ -298,7 +307,7 @@ impl Preparer {
         report: &mut ApplyReport,
     ) -> DrawList {
         let mut found: HashMap<String, Option<Arc<Program>>> = HashMap::new();
-        let gpu = self.gpu.clone();
+        let gpu = self.uploader.gpu.clone();
         let overrides = project_meta(revision).effects;
         let mut find = |effects: &EffectSet| {
             let name = format!("shader/{shader}/{}", variant_name(&overrides.apply(effects)));

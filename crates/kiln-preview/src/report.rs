@@ -10,6 +10,7 @@ use crate::camera::OrbitCamera;
 use crate::keeper::Resolved;
 use crate::parameter::OfferedParameter;
 use crate::target::{ProjectMeta, read_meta};
+use crate::upload::Uploaded;
 use crate::view::Selection;
 
 /// What came of a revision.
@@ -41,6 +42,8 @@ pub struct ApplyReport {
     pub stale: Vec<String>,
     /// Targets whose resources were made anew; what is not here was reused or not needed.
     pub made: Vec<String>,
+    /// What these took to the device.
+    pub uploaded: Uploaded,
 }
 
 /// An animation to choose.

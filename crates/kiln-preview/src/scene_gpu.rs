@@ -13,6 +13,7 @@ use wgpu::util::{BufferInitDescriptor, DeviceExt as _};
 use crate::mip::Average;
 use crate::slot::{Map, Neutral};
 use crate::texture::{create_sampler, create_trilinear_sampler, upload_image};
+use crate::upload::Uploader;
 
 /// A loaded scene: the CPU side without vertices and images, and the device's side.
 #[derive(Debug)]
@@ -53,22 +54,23 @@ pub(crate) struct Mesh {
 
 impl GpuScene {
     /// Loads a normalised GLB and uploads what it holds.
-    pub fn upload(gpu: &Gpu, name: &str, glb: &[u8]) -> Result<Self, Diagnostic> {
+    pub fn upload(uploader: &Uploader, name: &str, glb: &[u8]) -> Result<Self, Diagnostic> {
+        let gpu = &uploader.gpu;
         let failed = |error: kiln_scene::SceneError| {
             Diagnostic::error(format!("scene `{name}` cannot be loaded")).with_note(error.to_string())
         };
         let mut scene = kiln_scene::load(glb).map_err(failed)?;
-        let meshes = scene.primitives.iter().map(|primitive| Mesh::upload(gpu, name, primitive));
+        let meshes = scene.primitives.iter().map(|primitive| Mesh::upload(uploader, name, primitive));
         let meshes = meshes.collect::<Result<_, _>>()?;
-        let instances = all_draws(&scene).map(|draw| upload_instances(gpu, name, draw));
+        let instances = all_draws(&scene).map(|draw| upload_instances(uploader, name, draw));
         let instances = instances.collect::<Result<_, _>>()?;
         let rest = scene.pose(None, 0.0);
-        let stored = |label, contents| upload_stored(gpu, name, label, contents);
+        let stored = |label, contents| upload_stored(uploader, name, label, contents);
         let joints = rest.skins.iter().map(|it| stored("joint matrices", bytemuck::cast_slice(it)));
         let weights = rest.morphs.iter().map(|it| stored("morph weights", bytemuck::cast_slice(it)));
         let (joint_matrices, morph_weights) =
             (joints.collect::<Result<_, _>>()?, weights.collect::<Result<_, _>>()?);
-        let textures = upload_textures(gpu, &scene);
+        let textures = upload_textures(uploader, &scene);
         for primitive in &mut scene.primitives {
             primitive.vertices = Vec::new();
             primitive.indices = Vec::new();
@@ -78,7 +80,7 @@ impl GpuScene {
         scene.images = Vec::new();
         let neutral = |label, rgba: [u8; 4]| {
             let texel = Image8 { width: 1, height: 1, rgba: rgba.to_vec() };
-            upload_image(gpu, label, &texel, Average::Linear)
+            upload_image(uploader, label, &texel, Average::Linear)
         };
         Ok(GpuScene {
             scene,
@@ -140,10 +142,10 @@ pub(crate) fn all_draws(scene: &Scene) -> impl Iterator<Item = &Draw> {
 }
 
 impl Mesh {
-    fn upload(gpu: &Gpu, name: &str, primitive: &Primitive) -> Result<Self, Diagnostic> {
-        let limits = gpu.device.limits();
+    fn upload(uploader: &Uploader, name: &str, primitive: &Primitive) -> Result<Self, Diagnostic> {
+        let limits = uploader.gpu.device.limits();
         let upload =
-            |label, contents, usage| upload(gpu, name, label, contents, usage, limits.max_buffer_size);
+            |label, contents, usage| upload(uploader, name, label, contents, usage, limits.max_buffer_size);
         let vertices: &[u8] = bytemuck::cast_slice(&primitive.vertices);
         let indices: &[u8] = bytemuck::cast_slice(&primitive.indices);
         let influences: &[u8] = bytemuck::cast_slice::<Influence, u8>(&primitive.influences);
@@ -157,7 +159,7 @@ impl Mesh {
                 true => None,
                 false => Some(upload("influences", influences, wgpu::BufferUsages::VERTEX)?),
             },
-            morph_deltas: upload_stored(gpu, name, "morph deltas", bytemuck::cast_slice(&deltas))?,
+            morph_deltas: upload_stored(uploader, name, "morph deltas", bytemuck::cast_slice(&deltas))?,
             morph_reach: primitive.targets.iter().map(reach).collect(),
         })
     }
@@ -174,26 +176,30 @@ fn reach(target: &MorphTarget) -> Bounds {
     Bounds { min: positions().fold(Vec3::ZERO, Vec3::min), max: positions().fold(Vec3::ZERO, Vec3::max) }
 }
 
-fn upload_instances(gpu: &Gpu, name: &str, draw: &Draw) -> Result<Option<wgpu::Buffer>, Diagnostic> {
+fn upload_instances(
+    uploader: &Uploader,
+    name: &str,
+    draw: &Draw,
+) -> Result<Option<wgpu::Buffer>, Diagnostic> {
     let matrices: Vec<Mat4> = draw.instances.iter().map(kiln_scene::Instance::matrix).collect();
-    upload_stored(gpu, name, "instances", bytemuck::cast_slice(&matrices))
+    upload_stored(uploader, name, "instances", bytemuck::cast_slice(&matrices))
 }
 
 /// A storage buffer that frames may write; `None` for nothing.
 fn upload_stored(
-    gpu: &Gpu,
+    uploader: &Uploader,
     scene: &str,
     label: &str,
     contents: &[u8],
 ) -> Result<Option<wgpu::Buffer>, Diagnostic> {
     let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
-    let limits = gpu.device.limits();
+    let limits = uploader.gpu.device.limits();
     // A device without storage buffers refuses the shaders that read them, by name.
     if contents.is_empty() || limits.max_storage_buffer_binding_size == 0 {
         return Ok(None);
     }
     let bytes_max = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
-    upload(gpu, scene, label, contents, usage, bytes_max).map(Some)
+    upload(uploader, scene, label, contents, usage, bytes_max).map(Some)
 }
 
 fn write(gpu: &Gpu, buffer: Option<&wgpu::Buffer>, contents: &[u8]) {
@@ -211,7 +217,7 @@ fn neutral_storage(gpu: &Gpu, contents: &[f32]) -> wgpu::Buffer {
 }
 
 fn upload(
-    gpu: &Gpu,
+    uploader: &Uploader,
     scene: &str,
     label: &str,
     contents: &[u8],
@@ -223,11 +229,11 @@ fn upload(
         let message = format!("scene `{scene}` needs {needed} bytes in one buffer of {label}");
         return Err(Diagnostic::error(message).with_note(format!("this device takes {bytes_max}")));
     }
-    Ok(gpu.device.create_buffer_init(&BufferInitDescriptor { label: Some(label), contents, usage }))
+    Ok(uploader.buffer(label, contents, usage))
 }
 
 /// One device texture for each image and way to average, one sampler for each way to sample.
-fn upload_textures(gpu: &Gpu, scene: &Scene) -> Vec<(wgpu::TextureView, wgpu::Sampler)> {
+fn upload_textures(uploader: &Uploader, scene: &Scene) -> Vec<(wgpu::TextureView, wgpu::Sampler)> {
     let mut views: HashMap<(usize, Average), wgpu::TextureView> = HashMap::new();
     let mut samplers: HashMap<Sampler, wgpu::Sampler> = HashMap::new();
     let white = Image8 { width: 1, height: 1, rgba: vec![255; 4] };
@@ -235,8 +241,9 @@ fn upload_textures(gpu: &Gpu, scene: &Scene) -> Vec<(wgpu::TextureView, wgpu::Sa
         let average = Average::from(texture.color_space);
         let image = scene.images.get(texture.image).unwrap_or(&white);
         let view = views.entry((texture.image, average));
-        let view = view.or_insert_with(|| upload_image(gpu, "material", image, average)).clone();
-        let sampler = samplers.entry(texture.sampler).or_insert_with(|| create_sampler(gpu, texture.sampler));
+        let view = view.or_insert_with(|| upload_image(uploader, "material", image, average)).clone();
+        let sampler =
+            samplers.entry(texture.sampler).or_insert_with(|| create_sampler(&uploader.gpu, texture.sampler));
         (view, sampler.clone())
     };
     scene.textures.iter().map(upload).collect()

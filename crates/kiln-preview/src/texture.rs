@@ -12,6 +12,7 @@ use kiln_scene::{Image8, Sampler, Wrap};
 use crate::mip::{Average, smaller_levels};
 use crate::neutral;
 use crate::target::{CubeMeta, LutMeta, TexelFormat};
+use crate::upload::Uploader;
 
 /// An environment map with what a lookup needs to know.
 #[derive(Clone, Debug)]
@@ -35,12 +36,13 @@ pub(crate) struct LutTexture {
 impl CubeTexture {
     /// Uploads a cube target, level by level.
     pub fn upload(
-        gpu: &Gpu,
+        uploader: &Uploader,
         name: &str,
         target: &Target,
         revision: &Revision,
         meta: &CubeMeta,
     ) -> Result<Self, Diagnostic> {
+        let gpu = &uploader.gpu;
         let limit = gpu.device.limits().max_texture_dimension_2d;
         let levels_max = meta.size.checked_ilog2().map_or(0, |log| log + 1);
         if meta.size == 0 || meta.size > limit || meta.levels == 0 || meta.levels > levels_max {
@@ -59,7 +61,7 @@ impl CubeTexture {
         let texture = create_texture(gpu, name, meta.size, 6, meta.levels, filterable(gpu, format).wgpu());
         for (level, texels) in &parts {
             let texels = convert(texels, format, filterable(gpu, format), extra_log2);
-            write_level(gpu, &texture, *level, &texels);
+            uploader.write_level(&texture, *level, &texels);
         }
         Ok(CubeTexture {
             view: cube_view(&texture),
@@ -78,17 +80,28 @@ impl CubeTexture {
     }
 
     /// The same dim grey from everywhere: stands in for an absent map.
-    pub fn neutral(gpu: &Gpu) -> Self {
-        let texture = create_texture(gpu, "neutral environment", 1, 6, 1, wgpu::TextureFormat::Rgba16Float);
+    pub fn neutral(uploader: &Uploader) -> Self {
+        let texture =
+            create_texture(&uploader.gpu, "neutral environment", 1, 6, 1, wgpu::TextureFormat::Rgba16Float);
         let grey = [neutral::RADIANCE, neutral::RADIANCE, neutral::RADIANCE, 1.0].map(f16::from_f32);
-        write_level(gpu, &texture, 0, bytemuck::cast_slice(&[grey; 6].map(|texel| texel.map(f16::to_bits))));
+        uploader.write_level(
+            &texture,
+            0,
+            bytemuck::cast_slice(&[grey; 6].map(|texel| texel.map(f16::to_bits))),
+        );
         CubeTexture { view: cube_view(&texture), levels: 1, present: [0, 0], scale: 1.0, notes: Vec::new() }
     }
 }
 
 impl LutTexture {
     /// Uploads a `lut` target.
-    pub fn upload(gpu: &Gpu, name: &str, texels: &[u8], meta: &LutMeta) -> Result<Self, Diagnostic> {
+    pub fn upload(
+        uploader: &Uploader,
+        name: &str,
+        texels: &[u8],
+        meta: &LutMeta,
+    ) -> Result<Self, Diagnostic> {
+        let gpu = &uploader.gpu;
         let limit = gpu.device.limits().max_texture_dimension_2d;
         let expected = u64::from(meta.size) * u64::from(meta.size) * meta.format.bytes();
         if meta.size == 0 || meta.size > limit || meta.format.channels() != 2 {
@@ -98,21 +111,27 @@ impl LutTexture {
         check_length(name, "texels", texels, expected)?;
         let format = filterable(gpu, meta.format);
         let texture = create_texture(gpu, name, meta.size, 1, 1, format.wgpu());
-        write_level(gpu, &texture, 0, &convert(texels, meta.format, format, 0));
+        uploader.write_level(&texture, 0, &convert(texels, meta.format, format, 0));
         Ok(LutTexture { view: texture.create_view(&wgpu::TextureViewDescriptor::default()) })
     }
 
     /// Scale 1, bias 0: reflectance is F0, whatever the view.
-    pub fn neutral(gpu: &Gpu) -> Self {
-        let texture = create_texture(gpu, "neutral table", 1, 1, 1, wgpu::TextureFormat::Rg16Float);
+    pub fn neutral(uploader: &Uploader) -> Self {
+        let texture = create_texture(&uploader.gpu, "neutral table", 1, 1, 1, wgpu::TextureFormat::Rg16Float);
         let texel = [f16::ONE.to_bits(), f16::ZERO.to_bits()];
-        write_level(gpu, &texture, 0, bytemuck::cast_slice(&texel));
+        uploader.write_level(&texture, 0, bytemuck::cast_slice(&texel));
         LutTexture { view: texture.create_view(&wgpu::TextureViewDescriptor::default()) }
     }
 }
 
 /// Uploads an image with all its levels; one that is larger than the device takes loses its first levels.
-pub(crate) fn upload_image(gpu: &Gpu, label: &str, image: &Image8, average: Average) -> wgpu::TextureView {
+pub(crate) fn upload_image(
+    uploader: &Uploader,
+    label: &str,
+    image: &Image8,
+    average: Average,
+) -> wgpu::TextureView {
+    let gpu = &uploader.gpu;
     let limit = gpu.device.limits().max_texture_dimension_2d;
     let smaller = smaller_levels(image, average);
     let all = std::iter::once(image).chain(&smaller);
@@ -124,7 +143,7 @@ pub(crate) fn upload_image(gpu: &Gpu, label: &str, image: &Image8, average: Aver
     let size = wgpu::Extent3d { width: levels[0].width, height: levels[0].height, depth_or_array_layers: 1 };
     let texture = create_sized_texture(gpu, label, size, levels.len() as u32, format);
     for (level, image) in levels.iter().enumerate() {
-        write_level(gpu, &texture, level as u32, &image.rgba);
+        uploader.write_level(&texture, level as u32, &image.rgba);
     }
     texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
@@ -298,21 +317,4 @@ fn cube_view(texture: &wgpu::Texture) -> wgpu::TextureView {
         dimension: Some(wgpu::TextureViewDimension::Cube),
         ..Default::default()
     })
-}
-
-/// Writes all layers of a level from tight rows.
-fn write_level(gpu: &Gpu, texture: &wgpu::Texture, mip_level: u32, texels: &[u8]) {
-    let full = texture.size();
-    let (width, height) = ((full.width >> mip_level).max(1), (full.height >> mip_level).max(1));
-    let texel_bytes = texture.format().block_copy_size(None).unwrap_or(0);
-    gpu.queue.write_texture(
-        wgpu::TexelCopyTextureInfo { mip_level, ..texture.as_image_copy() },
-        texels,
-        wgpu::TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some(width * texel_bytes),
-            rows_per_image: Some(height),
-        },
-        wgpu::Extent3d { width, height, depth_or_array_layers: full.depth_or_array_layers },
-    );
 }

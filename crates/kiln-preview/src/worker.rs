@@ -84,9 +84,6 @@ fn prepare_newest(gpu: &Gpu, requests: &Receiver<Request>, ready: &Mutex<Option<
         let request = requests.try_iter().last().unwrap_or(request);
         let Request { revision, selection, overrides, .. } = &request;
         let Some(prepared) = preparer.prepare(revision, selection, overrides) else { continue };
-        gpu.queue.submit([]);
-        // A lost device is shown by the window; there is nothing to wait for then.
-        drop(gpu.wait());
         *ready.lock().unwrap_or_else(PoisonError::into_inner) = Some(Ready {
             prepared: Arc::new(prepared),
             received_unix_ms: request.received_unix_ms,

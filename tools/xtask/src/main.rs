@@ -32,8 +32,9 @@ cargo xtask bench shaders         save to first diagnostic, variants a second, w
 cargo xtask bench scenes [MB] [RUNS]
                                   time and memory of loading and packing a generated GLB (default 100 MB, 5 runs)
 cargo xtask bench render [FRAMES] milliseconds a frame of real scenes, and what each effect costs; $KILN_CORPUS
+cargo xtask bench swap [COUNT]    a large chain swapped in while frames are drawn, and the memory of COUNT hot swaps (default 1000)
 cargo xtask bench demand          the corpus as one project: baked as its scenes need it and in full; $KILN_CORPUS
-cargo xtask bench bake […]        error and cost of prefiltered maps beside a sampled estimator; accuracy, sampled, time, scaling:
+cargo xtask bench bake […]        error and cost of prefiltered maps beside a sampled estimator; accuracy, sampled, model, time, scaling:
                                   one part alone; --huge: memory of a 16384×8192 panorama; panoramas from $KILN_CORPUS
 cargo xtask faults [COUNT]        kill COUNT processes at random moments and flip COUNT bits (default 1000)
 cargo xtask fuzz [COUNT] [SEED]   decode COUNT damaged copies of each image file of the tests (default 100000)
@@ -53,6 +54,8 @@ fn main() -> ExitCode {
         ["test", "--no-install"] => test::run(false),
         ["bench"] => bench::run(20),
         ["bench", "cache"] => bench_cache::run(),
+        ["bench", "swap"] => test::swaps("1000"),
+        ["bench", "swap", count] => test::swaps(count),
         ["bench", "demand"] => bench_demand::run(),
         ["bench", "render"] => bench_render::run(8),
         ["bench", "render", frames] => match frames.parse() {

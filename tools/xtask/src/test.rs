@@ -92,6 +92,16 @@ pub(crate) fn fuzz_wire(count: Option<&str>, seed: Option<&str>) -> Result<(), S
     step("fuzz wire", &mut tests)
 }
 
+/// Swaps `count` shaders, lights and materials under a renderer, and prints what memory that takes.
+pub(crate) fn swaps(count: &str) -> Result<(), String> {
+    let arguments =
+        ["test", "--release", "-p", "kiln-preview", "--lib", "--", "tests::swap::", "--nocapture"];
+    let mut tests = cargo(&arguments);
+    // One after another: memory and times are of one alone.
+    tests.args(["--test-threads", "1"]).env("KILN_SWAPS", number(count)?);
+    step("bench swap", &mut tests)
+}
+
 fn number(text: &str) -> Result<&str, String> {
     text.parse::<u64>().map(|_| text).map_err(|_| format!("`{text}` is no number"))
 }

@@ -1,7 +1,7 @@
 //! `cargo xtask bench bake`: what a bake costs and how exact it is, beside a plain sampled estimator.
 //!
 //! ```text
-//! … [accuracy] [sampled] [time] [scaling] [--huge] [--only NAME]
+//! … [accuracy] [sampled] [model] [time] [scaling] [--huge] [--only NAME]
 //! ```
 //!
 //! Without a section's name all run. `--huge` measures the memory of a 16384×8192 panorama too, in a process of its own.
@@ -17,6 +17,7 @@
 mod accuracy;
 mod clock;
 mod huge;
+mod model;
 mod panoramas;
 mod sampled;
 mod time;
@@ -47,7 +48,7 @@ fn main() -> ExitCode {
     }
     let only = arguments.iter().skip_while(|argument| *argument != "--only").nth(1);
     let only = only.map_or("", String::as_str);
-    let sections = ["accuracy", "sampled", "time", "scaling"];
+    let sections = ["accuracy", "sampled", "model", "time", "scaling"];
     let is_all = !sections.iter().any(|section| has(section)) && !has("--huge");
     let mut verdict = Verdict::default();
     println!("{}", clock::machine());
@@ -56,6 +57,9 @@ fn main() -> ExitCode {
     }
     if is_all || has("sampled") {
         sampled::run(only);
+    }
+    if is_all || has("model") {
+        model::run(only);
     }
     if is_all || has("time") {
         time::run(&mut verdict);

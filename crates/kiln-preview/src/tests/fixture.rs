@@ -179,6 +179,13 @@ impl Build {
         self
     }
 
+    /// Forgets contents that the table no longer names.
+    pub fn forget_unused(&mut self) {
+        let parts = self.table.targets.values().flat_map(|target| &target.parts);
+        let used: BTreeSet<Digest> = parts.map(|part| part.digest).collect();
+        self.blobs.retain(|digest, _| used.contains(digest));
+    }
+
     pub fn revision(&self) -> Revision {
         Revision::new(self.table.clone(), self.blobs.clone()).expect("every part has its blob")
     }

@@ -10,6 +10,7 @@ mod lights;
 mod panels;
 mod parameters;
 mod pure;
+mod swap;
 mod transmission;
 mod twin;
 mod wire;

@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use kiln_bake::{Cancel, Lobe, reference_radiance};
+use kiln_bake::{Cancel, Surface, split_sum_radiance};
 use kiln_image::{Image, Limits, Panorama};
 use serde_json::json;
 
@@ -28,14 +28,6 @@ const BETWEEN: f64 = 4.5 / 6.0;
 /// The same half-way between two of seven levels, where a mean of two lobes stands for the one between them: what no exactness of
 /// the levels buys.
 const RMS_MAX_BETWEEN: f64 = 0.06;
-
-/// A material as both shade it.
-#[derive(Clone, Copy)]
-struct Surface {
-    color: [f64; 3],
-    metallic: f64,
-    roughness: f64,
-}
 
 /// A panorama averaged down in whole blocks.
 fn averaged(panorama: &Panorama) -> Option<Panorama> {
@@ -74,32 +66,6 @@ fn filtered(roughness: f64, x: f64, y: f64, normal: DVec3) -> Option<f64> {
     Some((roughness.powi(4) + (2.0 * variance).min(0.18)).min(1.0).sqrt().sqrt())
 }
 
-/// What `shaders/pbr/base.wgsl` computes, exactly lit.
-fn shaded(panorama: &Panorama, surface: Surface, roughness: f64, normal: DVec3, view: DVec3) -> [f64; 3] {
-    let Surface { color, metallic, .. } = surface;
-    let n_dot_v = normal.dot(view).clamp(0.0, 1.0);
-    let mirror = 2.0 * normal.dot(view) * normal - view;
-    let smoothness = 1.0 - roughness * roughness;
-    let direction = normal.lerp(mirror, smoothness * (smoothness.sqrt() + roughness * roughness)).normalize();
-    let alpha = roughness * roughness;
-    let specular_light = reference_radiance(panorama, Lobe::Ggx { alpha }, direction.to_array());
-    let irradiance = reference_radiance(panorama, Lobe::Lambert, normal.to_array());
-    let [scale, bias] = kiln_brdf::dfg_ggx(n_dot_v, roughness);
-    let lost = 1.0 - scale - bias;
-    let albedos = color.map(|color| {
-        let f0 = 0.04 * (1.0 - metallic) + color * metallic;
-        let single = f0 * scale + bias;
-        let average = f0 + (1.0 - f0) / 21.0;
-        (single, single * average * lost / (1.0 - average * lost))
-    });
-    let left = 1.0 - albedos.iter().map(|(single, multiple)| single + multiple).fold(0.0, f64::max);
-    std::array::from_fn(|at| {
-        let (single, multiple) = albedos[at];
-        let diffuse = color[at] * (1.0 - metallic) * left;
-        single * specular_light[at] + (multiple + diffuse) * irradiance[at]
-    })
-}
-
 /// Relative RMS difference of the drawn sphere and the twin's, whose surface may be another.
 fn difference(radiance: &Image, panorama: &Panorama, twin: Surface) -> f64 {
     let (mut squares, mut whole, mut count) = (0.0, 0.0, 0);
@@ -111,7 +77,8 @@ fn difference(radiance: &Image, panorama: &Panorama, twin: Surface) -> f64 {
                 continue;
             }
             let Some(roughness) = filtered(twin.roughness, x as f64, y as f64, normal) else { continue };
-            let expected = shaded(panorama, twin, roughness, normal, view);
+            let surface = Surface { roughness, ..twin };
+            let expected = split_sum_radiance(panorama, surface, normal.to_array(), view.to_array());
             let drawn = radiance.texel(x, y);
             for at in 0..3 {
                 squares += (f64::from(drawn[at]) - expected[at]).powi(2);
