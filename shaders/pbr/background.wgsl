@@ -22,7 +22,9 @@ fn vs_main(@builtin(vertex_index) vertex_index: u32) -> Varying {
 
 @fragment
 fn fs_main(in: Varying) -> @location(0) vec4f {
-    if frame.background_blur > 0.0 {
+    // Asked of the direction too: see the tonemap about branches that hang on uniforms alone.
+    let spread = frame.background_blur * in.direction;
+    if dot(spread, spread) > 0.0 {
         return vec4f(within_f16(specular_radiance(in.direction, min(frame.background_blur, 1.0))), 1.0);
     }
     return vec4f(within_f16(skybox_radiance(in.direction)), 1.0);

@@ -11,14 +11,11 @@ const WHITE_BALANCE = vec3f(1.0, 1.0, 1.0);
 // Luminance that the Reinhard curve maps to white.
 const REINHARD_WHITE = 4.0;
 
-struct Params {
-    tone_mapper: u32, // @choice(0, neutral, agx, aces, reinhard, none) how radiance becomes display values
-}
-
-@group(3) @binding(0) var<uniform> params: Params;
+// No uniform: lavapipe compiles a shader anew for every frame whose branches hang on uniforms alone.
+override tone_mapper: u32 = 0u; // @choice(0, neutral, agx, aces, reinhard, none) how radiance becomes display values
 
 fn tone_map(linear: vec3f) -> vec3f {
-    switch params.tone_mapper {
+    switch tone_mapper {
         case 1u: { return tone_map_agx(linear); }
         case 2u: { return tone_map_aces_fitted(linear); }
         case 3u: { return tone_map_reinhard_extended(linear, REINHARD_WHITE); }

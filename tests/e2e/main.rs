@@ -23,6 +23,7 @@ mod parameters;
 mod render;
 mod shader_commands;
 mod shaders;
+mod storms;
 mod tidy;
 #[cfg(feature = "preview")]
 mod window;

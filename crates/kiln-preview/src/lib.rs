@@ -23,7 +23,7 @@ pub use parameter::{OfferedParameter, ParameterValues};
 pub use report::{ApplyReport, OfferedAnimation};
 pub use run::{HeadlessOptions, HeadlessReport, run_headless};
 pub use upload::Uploaded;
-pub use view::{AnimationTime, Selection, View};
+pub use view::{AnimationTime, DiffuseSource, Selection, View};
 pub use window::{WindowOptions, run_window};
 
 mod assignment;
@@ -32,6 +32,7 @@ mod camera;
 mod connection;
 mod draw_list;
 mod frame_watcher;
+mod harmonics;
 mod headless;
 mod keeper;
 mod lights;

@@ -10,6 +10,7 @@ use kiln_scene::{Effect, EffectSet, Material, variant_name};
 use kiln_shader::Reflection;
 
 use crate::draw_list::DrawList;
+use crate::harmonics;
 use crate::keeper::{Keeper, Key};
 use crate::neutral;
 use crate::own::OwnTextures;
@@ -20,7 +21,7 @@ use crate::scene_gpu::GpuScene;
 use crate::target::{CubeMeta, LutMeta, ProjectMeta, Role, SceneMeta, ShaderMeta, read_meta};
 use crate::texture::{CubeTexture, LutTexture, create_trilinear_sampler};
 use crate::upload::Uploader;
-use crate::view::Selection;
+use crate::view::{DiffuseSource, Selection};
 
 /// The environment as shaders read it.
 #[derive(Clone, Debug)]
@@ -110,7 +111,11 @@ impl Preparer {
         let env = choose(selection.env.as_deref(), scene_env, &report.envs, "environment", &mut report.notes);
         let is_cloth = |material: &Material| material.effects.contains(&Effect::Sheen);
         let has_cloth = scene.as_ref().is_some_and(|scene| scene.scene.materials.iter().any(is_cloth));
-        let environment = self.environment(revision, env.as_deref(), has_cloth, &mut report);
+        let mut environment = self.environment(revision, env.as_deref(), has_cloth, &mut report);
+        if let (DiffuseSource::Harmonics, Some(env)) = (selection.diffuse, &env) {
+            let harmonics = self.harmonics(revision, &format!("env/{env}/sh"), &mut report);
+            environment.irradiance = harmonics.unwrap_or(environment.irradiance);
+        }
         let tonemap = self.full_screen_program(revision, Role::Tonemap, &mut report);
         let tonemap = tonemap.or_else(|| self.neutral_tonemap.clone())?;
         let tonemap_pipeline = tonemap.pipeline(&self.uploader.gpu.device, Raster::FULL_SCREEN);
@@ -125,7 +130,7 @@ impl Preparer {
         });
         let draws = scene.as_ref().map(|scene| self.draws(revision, scene, variant, &shader, &mut report));
         let variant = variant.map(|index| report.variants[index].clone());
-        report.shown = Selection { scene: scene_name, env, variant };
+        report.shown = Selection { scene: scene_name, env, variant, diffuse: selection.diffuse };
         // A scene's notes stand in its facts and in its GLB.
         let mut said = std::collections::BTreeSet::new();
         report.notes.retain(|note| said.insert(note.clone()));
@@ -216,6 +221,27 @@ impl Preparer {
         let cube = cube.unwrap_or_else(|| Arc::clone(&self.neutral_cube));
         report.notes.extend(cube.notes.iter().cloned());
         cube
+    }
+
+    fn harmonics(
+        &mut self,
+        revision: &Revision,
+        name: &str,
+        report: &mut ApplyReport,
+    ) -> Option<Arc<CubeTexture>> {
+        let Some(target) = revision.table.targets.get(name) else {
+            report.notes.push(format!("`{name}` is absent: diffuse light is read from the map"));
+            return None;
+        };
+        let (uploader, gpu) = (&self.uploader, &self.uploader.gpu);
+        let resolved = self.cubes.resolve(gpu, name, Key::of(target), || {
+            let json = revision.part(name, "json");
+            let json =
+                json.ok_or_else(|| Diagnostic::error(format!("target `{name}` has no part `json`")))?;
+            let (texels, scale_log2) = harmonics::irradiance_cube(name, json)?;
+            Ok(CubeTexture::of_one_level(uploader, name, harmonics::FACE_SIZE as u32, &texels, scale_log2))
+        });
+        report.take(name, resolved)
     }
 
     fn lut(&mut self, revision: &Revision, name: &str, report: &mut ApplyReport) -> Arc<LutTexture> {

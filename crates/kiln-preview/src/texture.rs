@@ -81,15 +81,18 @@ impl CubeTexture {
 
     /// The same dim grey from everywhere: stands in for an absent map.
     pub fn neutral(uploader: &Uploader) -> Self {
-        let texture =
-            create_texture(&uploader.gpu, "neutral environment", 1, 6, 1, wgpu::TextureFormat::Rgba16Float);
         let grey = [neutral::RADIANCE, neutral::RADIANCE, neutral::RADIANCE, 1.0].map(f16::from_f32);
-        uploader.write_level(
-            &texture,
-            0,
-            bytemuck::cast_slice(&[grey; 6].map(|texel| texel.map(f16::to_bits))),
-        );
-        CubeTexture { view: cube_view(&texture), levels: 1, present: [0, 0], scale: 1.0, notes: Vec::new() }
+        let texels = [grey; 6].map(|texel| texel.map(f16::to_bits));
+        Self::of_one_level(uploader, "neutral environment", 1, bytemuck::cast_slice(&texels), 0)
+    }
+
+    /// A cube of RGBA in binary16, six faces of `size`² texels; radiance is texel · 2^`scale_log2`.
+    pub fn of_one_level(uploader: &Uploader, label: &str, size: u32, texels: &[u8], scale_log2: i32) -> Self {
+        let format = wgpu::TextureFormat::Rgba16Float;
+        let texture = create_texture(&uploader.gpu, label, size, 6, 1, format);
+        uploader.write_level(&texture, 0, texels);
+        let (view, scale) = (cube_view(&texture), exp2(scale_log2));
+        CubeTexture { view, levels: 1, present: [0, 0], scale, notes: Vec::new() }
     }
 }
 

@@ -12,6 +12,18 @@ pub struct Selection {
     pub env: Option<String>,
     /// Name of one of the scene's `KHR_materials_variants`; `None` = the materials without any.
     pub variant: Option<String>,
+    /// What diffuse light is read from.
+    pub diffuse: DiffuseSource,
+}
+
+/// Where the irradiance of an environment comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DiffuseSource {
+    /// The baked map.
+    #[default]
+    Map,
+    /// The spherical harmonics, as engines read them that have no map: what these look like there.
+    Harmonics,
 }
 
 /// A moment of one of the scene's animations.

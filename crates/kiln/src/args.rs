@@ -425,6 +425,9 @@ pub(crate) struct PreviewArgs {
     /// Exposure in stops
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     pub(crate) exposure: f32,
+    /// What diffuse light is read from: the baked map, or the harmonics, to see what engines show that read these
+    #[arg(long, value_enum, default_value_t = Diffuse::Map)]
+    pub(crate) diffuse: Diffuse,
     /// Set a parameter that a shader's author offers: wetness=0.5, tonemap.tint=1,0.9,0.8, is_lit=false, mode=smooth
     #[arg(long, value_name = "[SHADER.]NAME=VALUE", requires = "headless")]
     pub(crate) param: Vec<kiln_preview::Assignment>,
@@ -494,6 +497,15 @@ pub(crate) struct RenderArgs {
     /// Lay all pictures out on one, a row for each scene under each light
     #[arg(long, value_name = "FILE.png")]
     pub(crate) sheet: Option<PathBuf>,
+}
+
+/// What diffuse light is read from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Diffuse {
+    /// The baked irradiance map.
+    Map,
+    /// The spherical harmonics.
+    Harmonics,
 }
 
 #[derive(Debug, ClapArgs)]

@@ -4,7 +4,7 @@ use egui::{ComboBox, RichText, ScrollArea, Slider, Ui};
 
 use super::PanelState;
 use crate::theme;
-use crate::view::{Selection, View};
+use crate::view::{DiffuseSource, Selection, View};
 
 pub(super) fn show(ui: &mut Ui, state: &mut PanelState) {
     ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
@@ -13,7 +13,8 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState) {
         if let Some(scene) = pick(ui, "scene", &state.report.scenes, shown.as_deref()) {
             // What was right for the other scene is not for this one: camera, light, variant, animation.
             (state.view.camera, state.view.scene_camera, state.view.animation) = (None, 0, None);
-            state.selection = Selection { scene: Some(scene), ..Selection::default() };
+            let diffuse = state.selection.diffuse;
+            state.selection = Selection { scene: Some(scene), diffuse, ..Selection::default() };
         }
         super::scene::show_variants(ui, state);
         super::scene::show_animations(ui, state);
@@ -23,6 +24,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState) {
             state.selection.env = Some(env);
         }
         show_light(ui, &mut state.view);
+        show_diffuse(ui, &mut state.selection.diffuse);
         super::parameters::show(ui, &state.report.parameters, &mut state.view.parameters);
         section(ui, "Camera");
         super::scene::show_cameras(ui, state);
@@ -79,6 +81,13 @@ fn show_light(ui: &mut Ui, view: &mut View) {
     if ui.add_enabled(*view != neutral, egui::Button::new("Reset light")).clicked() {
         *view = neutral;
     }
+}
+
+fn show_diffuse(ui: &mut Ui, source: &mut DiffuseSource) {
+    let mut reads_harmonics = *source == DiffuseSource::Harmonics;
+    let why = "Diffuse light as engines show it that read the harmonics instead of the map.";
+    ui.checkbox(&mut reads_harmonics, "Diffuse from harmonics").on_hover_text(why);
+    *source = if reads_harmonics { DiffuseSource::Harmonics } else { DiffuseSource::Map };
 }
 
 pub(super) fn row(ui: &mut Ui, label: &str, slider: Slider<'_>) {

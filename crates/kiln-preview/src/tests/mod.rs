@@ -6,6 +6,7 @@ mod effects;
 mod faults;
 mod fixture;
 mod frames;
+mod harmonics;
 mod lights;
 mod panels;
 mod parameters;

@@ -18,7 +18,7 @@ fn state() -> PanelState {
     state.report.scenes = vec!["ball".to_owned(), "car".to_owned()];
     state.report.envs = vec!["sky".to_owned(), "studio".to_owned()];
     state.report.shown =
-        Selection { scene: Some("ball".to_owned()), env: Some("sky".to_owned()), variant: None };
+        Selection { scene: Some("ball".to_owned()), env: Some("sky".to_owned()), ..Selection::default() };
     state
 }
 

@@ -44,7 +44,7 @@ fn chain_of_1024_faces_comes_in_pieces_and_a_frame_fits_between_any_two() {
     let Some(gpu) = gpu() else { return };
     let mut build = ball(0.5);
     let mut preparer = Preparer::new(&gpu);
-    let mut prepare = |preparer: &mut Preparer, build: &Build| {
+    let prepare = |preparer: &mut Preparer, build: &Build| {
         let prepared =
             preparer.prepare(&build.revision(), &Selection::default(), &ParameterValues::default());
         Arc::new(prepared.expect("the built-in tonemap is sound"))
@@ -75,7 +75,8 @@ fn frames_are_drawn_while_a_large_chain_is_swapped_in() {
     let Some(gpu) = gpu() else { return };
     let mut build = ball(0.5);
     let (wake, woken) = channel();
-    let worker = Worker::spawn(gpu.clone(), move || drop(wake.send(()))).expect("a thread starts");
+    let worker =
+        Worker::spawn(gpu.clone(), move || wake.send(()).unwrap_or_default()).expect("a thread starts");
     let ask = |build: &Build| {
         worker.request(Request {
             revision: Arc::new(build.revision()),
@@ -174,7 +175,6 @@ fn hot_swaps_leave_nothing_on_the_device() {
     let start = Instant::now();
     for step in 0..count + warm {
         edit(&mut build, step);
-        // The fixture keeps every content it ever had; a client does not.
         let revision = build.revision();
         let prepared = preparer.prepare(&revision, &Selection::default(), &ParameterValues::default());
         let prepared = prepared.expect("the built-in tonemap is sound");
@@ -182,6 +182,7 @@ fn hot_swaps_leave_nothing_on_the_device() {
         renderer.show(Arc::new(prepared));
         assert!(renderer.render(&View::default()).is_some());
         gpu.wait().expect("the device finishes the frame");
+        // The fixture keeps every content it ever had; a client does not.
         build.forget_unused();
         if step + 1 == warm {
             settled = memory(&gpu);

@@ -19,7 +19,7 @@ use crate::{INPUT_IS_WRONG, place, report};
 const WINDOW_POINTS: [f32; 2] = [1280.0, 760.0];
 
 pub(crate) fn run(args: &PreviewArgs) -> anyhow::Result<ExitCode> {
-    let selection = Selection { scene: args.scene.clone(), env: args.env.clone(), variant: None };
+    let selection = Selection { scene: args.scene.clone(), env: args.env.clone(), ..Selection::default() };
     let view = View { exposure_ev: args.exposure, ..View::default() };
     let socket = place::socket_of(&args.dir)?;
     if args.follow {

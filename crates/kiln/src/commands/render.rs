@@ -10,11 +10,11 @@ use kiln_diagnostic::{Diagnostic, has_errors};
 use kiln_gpu::Gpu;
 use kiln_image::sheet::{Shot, shot_sheet};
 use kiln_link::Revision;
-use kiln_preview::{AnimationTime, ApplyReport, Assignment, HeadlessViewer, Selection};
+use kiln_preview::{AnimationTime, ApplyReport, Assignment, DiffuseSource, HeadlessViewer, Selection};
 use kiln_shader::Widget;
 use serde::Serialize;
 
-use crate::args::RenderArgs;
+use crate::args::{Diffuse, RenderArgs};
 use crate::commands::bake::{progress_bar, show_progress};
 use crate::out::say;
 use crate::{INPUT_IS_WRONG, place, report};
@@ -29,7 +29,12 @@ pub(crate) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     for scene in chosen(&args.scene, &session.offered.scenes, "scene")? {
         for env in chosen(&args.env, &session.offered.envs, "environment")? {
             let variant = args.material_variant.clone();
-            session.draw_selection(&revision, Selection { scene: scene.clone(), env, variant })?;
+            let diffuse = match args.diffuse {
+                Diffuse::Map => DiffuseSource::Map,
+                Diffuse::Harmonics => DiffuseSource::Harmonics,
+            };
+            let selection = Selection { scene: scene.clone(), env, variant, diffuse };
+            session.draw_selection(&revision, selection)?;
         }
     }
     session.finish(&revision)
