@@ -14,9 +14,12 @@ pub use adapter::{FoundAdapter, choose_adapter, describe_adapter, device_descrip
 
 pub use compute::ComputePass;
 
+pub use submitted::Submitted;
+
 mod adapter;
 mod compute;
 mod readback;
+mod submitted;
 #[cfg(test)]
 mod tests;
 

@@ -4,7 +4,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
 
 use anyhow::Context as _;
-use kiln_gpu::Gpu;
+use kiln_gpu::Submitted;
 use kiln_link::FrameReport;
 
 use crate::worker::{Ready, unix_ms};
@@ -14,7 +14,7 @@ const FRAME_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// A frame whose end the daemon wants to know.
 pub(crate) struct Watched {
-    pub submission: wgpu::SubmissionIndex,
+    pub submitted: Submitted,
     pub ready: Ready,
     pub noticed_unix_ms: f64,
 }
@@ -27,17 +27,13 @@ pub(crate) struct FrameWatcher {
 
 impl FrameWatcher {
     /// Starts the thread; `wake` is called whenever [`FrameWatcher::latency_ms`] has something new.
-    pub fn spawn(
-        gpu: Gpu,
-        reports: Sender<FrameReport>,
-        wake: impl Fn() + Send + 'static,
-    ) -> anyhow::Result<Self> {
+    pub fn spawn(reports: Sender<FrameReport>, wake: impl Fn() + Send + 'static) -> anyhow::Result<Self> {
         let (frames, watched) = channel::<Watched>();
         let (sender, latencies_ms) = channel();
         let thread = std::thread::Builder::new().name("frames".into());
         let watch = move || {
             for frame in watched {
-                let (report, latency_ms) = await_frame(&gpu, frame);
+                let (report, latency_ms) = await_frame(frame);
                 // Both ends belong to the window: when they are gone, so is the need.
                 if reports.send(report).is_err()
                     || latency_ms.is_some_and(|latency_ms| sender.send(latency_ms).is_err())
@@ -63,11 +59,9 @@ impl FrameWatcher {
     }
 }
 
-fn await_frame(gpu: &Gpu, frame: Watched) -> (FrameReport, Option<f64>) {
-    let wait =
-        wgpu::PollType::Wait { submission_index: Some(frame.submission), timeout: Some(FRAME_TIMEOUT) };
+fn await_frame(frame: Watched) -> (FrameReport, Option<f64>) {
     // A lost device shows in the panel; its frame counts as drawn now.
-    drop(gpu.device.poll(wait));
+    frame.submitted.wait(FRAME_TIMEOUT);
     let drawn_unix_ms = unix_ms();
     let Ready { prepared, received_unix_ms, ready_unix_ms } = frame.ready;
     let revision = prepared.report.revision;

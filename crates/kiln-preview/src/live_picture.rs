@@ -79,9 +79,11 @@ impl LivePicture {
             return;
         }
         self.drawn = Some(view.clone());
-        let Some(submission) = self.renderer.render(view) else { return };
+        if self.renderer.render(view).is_none() {
+            return;
+        }
         if let Some(ready) = self.first_frame_of.take() {
-            self.watcher.watch(Watched { submission, ready, noticed_unix_ms });
+            self.watcher.watch(Watched { submitted: self.gpu.submitted(), ready, noticed_unix_ms });
         }
     }
 

@@ -126,9 +126,9 @@ impl Uploader {
     }
 
     fn submit(&self) {
-        let submission_index = Some(self.gpu.queue.submit([]));
+        self.gpu.queue.submit([]);
         // A lost device is shown by the window; there is nothing to wait for then.
-        drop(self.gpu.device.poll(wgpu::PollType::Wait { submission_index, timeout: Some(PIECE_TIMEOUT) }));
+        self.gpu.submitted().wait(PIECE_TIMEOUT);
         let bytes = self.unsent_bytes.take() as u64;
         let Uploaded { bytes: before, pieces, piece_bytes_max } = self.uploaded.get();
         self.uploaded.set(Uploaded {

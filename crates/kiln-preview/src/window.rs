@@ -89,7 +89,7 @@ impl Window {
             Connection::open(options.socket, waker(&context.egui_ctx)).context("starting a thread")?;
         let worker = Worker::spawn(gpu.clone(), waker(&context.egui_ctx)).context("starting a thread")?;
         let reports = connection.reports().context("the connection is closed")?;
-        let watcher = FrameWatcher::spawn(gpu.clone(), reports, waker(&context.egui_ctx))?;
+        let watcher = FrameWatcher::spawn(reports, waker(&context.egui_ctx))?;
         let panels = PanelState::new(gpu.description(), options.selection.clone(), options.view);
         Ok(Window {
             picture: LivePicture::new(gpu.clone(), render_state, watcher),
