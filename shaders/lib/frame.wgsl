@@ -38,6 +38,20 @@ struct Lights {
     items: array<PunctualLight, LIGHT_COUNT_MAX>,
 }
 
+// The environment's sun where it was extracted: a light from infinitely far.
+struct Sun {
+    // World to the shadow map: x and y from its upper left corner, z the depth it compares.
+    shadow_from_world: mat4x4f,
+    // Towards it, in the world, unit length.
+    direction: vec3f,
+    // Half of the angle that it is wide, in radians.
+    angular_radius: f32,
+    // Of a surface that faces it, in the environment's radiance times steradian, times intensity.
+    irradiance: vec3f,
+    // Edge of the shadow map's texels in the world.
+    shadow_texel: f32,
+}
+
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var env_skybox: texture_cube<f32>;
 @group(0) @binding(2) var env_irradiance: texture_cube<f32>;
@@ -50,3 +64,6 @@ struct Lights {
 @group(0) @binding(9) var lut_charlie: texture_2d<f32>;
 @group(0) @binding(10) var<uniform> lights: Lights;
 @group(0) @binding(11) var scene_color: texture_2d<f32>;
+@group(0) @binding(12) var<uniform> sun: Sun;
+@group(0) @binding(13) var sun_shadow: texture_depth_2d;
+@group(0) @binding(14) var sun_shadow_sampler: sampler_comparison;

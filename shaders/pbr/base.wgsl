@@ -1,10 +1,10 @@
-// The metallic-roughness base under the environment and the scene's own lights, with what shines through it. glTF 2.0, appendix B.
+// The metallic-roughness base under the environment and direct light, with what shines through it. glTF 2.0, appendix B.
 
 import lib::brdf::alpha2_filtered;
 import lib::environment::{dominant_direction, ggx_albedo, ggx_scale_bias, irradiance_over_pi, specular_radiance};
 @if(occlusion) import lib::material::specular_occlusion;
 import lib::vector::max_component;
-@if(anisotropy && punctual_lights) import super::anisotropy::Brush;
+@if(anisotropy && (punctual_lights || sun)) import super::anisotropy::Brush;
 @if(diffuse_transmission) import super::diffuse_transmission::Scattering;
 @if(transmission && dispersion) import super::dispersion::dispersed_radiance;
 @if(iridescence) import super::iridescence::{Film, iridescent_f0};
@@ -20,7 +20,7 @@ struct Base {
     normal: vec3f,
     // What mirror directions are taken at.
     @if(anisotropy) mirror_normal: vec3f,
-    @if(anisotropy && punctual_lights) brush: Brush,
+    @if(anisotropy && (punctual_lights || sun)) brush: Brush,
     view: vec3f,
     occlusion: f32,
     @if(transmission) entry: Entry,
@@ -31,11 +31,11 @@ struct Base {
     @if(diffuse_transmission) metallic: f32,
     @if(diffuse_transmission) scattering: Scattering,
     @if(iridescence) film: Film,
-    @if(punctual_lights) direct: Direct,
+    @if(punctual_lights || sun) direct: Direct,
 }
 
-// What punctual lights make of the base, before its colours.
-@if(punctual_lights)
+// What punctual lights and the sun make of the base, before its colours.
+@if(punctual_lights || sun)
 struct Direct {
     // What a white Lambert surface radiates: irradiance over π.
     irradiance_over_pi: vec3f,
@@ -65,7 +65,7 @@ fn base_radiance(base: Base) -> vec3f {
     var specular = albedo.single * specular_radiance(direction, roughness);
     @if(occlusion) specular *= specular_occlusion(n_dot_v, base.occlusion, roughness * roughness);
     var irradiance = irradiance_over_pi(base.normal) * base.occlusion;
-    @if(punctual_lights) {
+    @if(punctual_lights || sun) {
         specular += base.direct.specular;
         irradiance += base.direct.irradiance_over_pi;
     }
@@ -76,7 +76,7 @@ fn base_radiance(base: Base) -> vec3f {
     var diffuse = below * irradiance;
     @if(diffuse_transmission) {
         var irradiance_behind = irradiance_over_pi(-base.normal);
-        @if(punctual_lights) irradiance_behind += base.direct.behind_over_pi;
+        @if(punctual_lights || sun) irradiance_behind += base.direct.behind_over_pi;
         var behind = left * (1.0 - base.metallic) * base.scattering.color * irradiance_behind;
         @if(volume) behind *= base.transmittance;
         diffuse = mix(diffuse, behind, base.scattering.share);
@@ -84,7 +84,7 @@ fn base_radiance(base: Base) -> vec3f {
     @if(transmission) {
         @if(dispersion) var behind = dispersed_radiance(base.entry, base.ior);
         @else var behind = transmitted_radiance(base.entry, base.ior);
-        @if(punctual_lights) behind += base.direct.through;
+        @if(punctual_lights || sun) behind += base.direct.through;
         @if(volume) let through = behind * base.transmittance;
         @else let through = behind;
         diffuse = mix(diffuse, below * through, base.transmission);

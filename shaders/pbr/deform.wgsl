@@ -53,7 +53,10 @@ fn moved(source: Vertex, matrix: mat4x4f) -> Vertex {
     vertex.position = (matrix * vec4f(source.position, 1.0)).xyz;
     let linear = mat3x3f(matrix[0].xyz, matrix[1].xyz, matrix[2].xyz);
     @if(!unlit) vertex.normal = normal_matrix(linear) * source.normal;
-    @if((anisotropy || clearcoat || normal_map) && !unlit) vertex.tangent = vec4f(linear * source.tangent.xyz, source.tangent.w);
+    @if((anisotropy || clearcoat || normal_map) && !unlit) {
+        let side = select(1.0, -1.0, determinant(linear) < 0.0);
+        vertex.tangent = vec4f(linear * source.tangent.xyz, side * source.tangent.w);
+    }
     return vertex;
 }
 

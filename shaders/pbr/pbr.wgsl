@@ -1,4 +1,4 @@
-// The metallic-roughness material of glTF 2.0 under image-based light and punctual lights, with the effects that a scene calls
+// The metallic-roughness material of glTF 2.0 under image-based light, punctual lights and the sun, with the effects that a scene calls
 // for. Docs: docs/shader-interface.md. Every effect stands under its feature, so a variant declares, reads
 // and computes nothing that its scene does not use. `unlit` needs no other effect than those of colour and alpha.
 
@@ -16,11 +16,12 @@ import lib::vector::normalize_or;
 @if(diffuse_transmission && !unlit) import super::diffuse_transmission::scattering;
 import super::interface::{base_color_sampler, draw, material, Varying, Vertex};
 @if(iridescence && !unlit) import super::iridescence::film;
-@if(punctual_lights && !unlit) import super::punctual::direct_light;
-@if(clearcoat && punctual_lights && !unlit) import super::punctual::direct_coat;
-@if(punctual_lights && sheen && !unlit) import super::punctual::direct_sheen;
+@if((punctual_lights || sun) && !unlit) import super::punctual::{direct_light, LitPoint};
+@if(clearcoat && (punctual_lights || sun) && !unlit) import super::punctual::direct_coat;
+@if((punctual_lights || sun) && sheen && !unlit) import super::punctual::direct_sheen;
 @if(sheen && !unlit) import super::sheen::{sheen, under_sheen};
 @if(specular && !unlit) import super::specular::dielectric_reflectance;
+@if(sun && !unlit) import super::sun::sunlight;
 @if(transmission && !unlit) import super::transmission::transmission;
 @if((diffuse_transmission || transmission) && volume && !unlit) import super::volume::{medium_depth, medium_transmittance};
 
@@ -48,9 +49,11 @@ fn vs_main(source: Vertex) -> Varying {
     out.uv0 = vertex.uv0;
     out.uv1 = vertex.uv1;
     @if((anisotropy || clearcoat || normal_map) && !unlit) {
+        let linear = mat3x3f(draw.world_from_object[0].xyz, draw.world_from_object[1].xyz, draw.world_from_object[2].xyz);
+        // What an animation turns inside out has its bitangent on the other side.
+        let side = select(1.0, -1.0, determinant(linear) < 0.0);
         // A mesh without tangents has zeros here, and keeps its normal.
-        let tangent = (draw.world_from_object * vec4f(vertex.tangent.xyz, 0.0)).xyz;
-        out.tangent = vec4f(normalize_or(tangent, vec3f(0.0)), vertex.tangent.w);
+        out.tangent = vec4f(normalize_or(linear * vertex.tangent.xyz, vec3f(0.0)), side * vertex.tangent.w);
     }
     @if(vertex_color) out.color = vertex.color;
     @if(instancing && (diffuse_transmission || transmission) && volume && !unlit) out.instance = vertex.instance;
@@ -112,7 +115,7 @@ fn base_layer(in: Varying, color: vec3f, geometric_normal: vec3f, facing: f32, v
     @if(normal_map && !unlit) base.normal = facing * base_normal(in);
     @if(anisotropy) let brush = brush(in, base.normal);
     @if(anisotropy) base.mirror_normal = brushed_normal(brush, view, base.perceptual_roughness);
-    @if(anisotropy && punctual_lights) base.brush = brush;
+    @if(anisotropy && (punctual_lights || sun)) base.brush = brush;
     base.view = view;
     base.occlusion = 1.0;
     @if(occlusion && !unlit) base.occlusion = ambient_occlusion(in);
@@ -132,7 +135,6 @@ fn base_layer(in: Varying, color: vec3f, geometric_normal: vec3f, facing: f32, v
     @if(diffuse_transmission) base.metallic = metallic;
     @if(diffuse_transmission) base.scattering = scattering(in);
     @if(iridescence) base.film = film(in);
-    @if(punctual_lights) base.direct = direct_light(base, in.world_position);
     return base;
 }
 
@@ -141,18 +143,22 @@ fn shade(in: Varying, color: vec3f, facing: f32) -> vec3f {
     // A triangle whose normals cancel has no direction of its own; up is as good as any.
     let geometric_normal = normalize_or(in.normal, vec3f(0.0, 1.0, 0.0));
     let view = normalize_or(frame.camera_position - in.world_position, geometric_normal);
-    let base = base_layer(in, color, geometric_normal, facing, view);
+    var base = base_layer(in, color, geometric_normal, facing, view);
+    @if(punctual_lights || sun) var point: LitPoint;
+    @if(punctual_lights || sun) point.position = in.world_position;
+    @if(sun) point.sunlight = sunlight(in.world_position, facing * geometric_normal);
+    @if(punctual_lights || sun) base.direct = direct_light(base, point);
     var radiance = base_radiance(base);
     @if(sheen && !unlit) {
         let sheen = sheen(in);
         radiance = under_sheen(radiance, sheen, base.normal, view, base.occlusion);
-        @if(punctual_lights) radiance += direct_sheen(sheen, base.normal, view, in.world_position);
+        @if(punctual_lights || sun) radiance += direct_sheen(sheen, base.normal, view, point);
     }
     @if(emission && !unlit) radiance += emission(in);
     @if(clearcoat && !unlit) {
         let coat = coat(in, geometric_normal, facing);
         radiance = under_coat(radiance, coat, view, base.occlusion);
-        @if(punctual_lights) radiance += direct_coat(coat, view, in.world_position);
+        @if(punctual_lights || sun) radiance += direct_coat(coat, view, point);
     }
     return radiance;
 }

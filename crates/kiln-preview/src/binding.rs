@@ -14,6 +14,7 @@ use crate::pose::Pose;
 use crate::prepare::Environment;
 use crate::program::{Bound, Program};
 use crate::scene_gpu::GpuScene;
+use crate::shadow::ShadowSource;
 use crate::slot::Slot;
 use crate::uniform::{FrameValues, draw_member, fill_block, material_member};
 
@@ -25,16 +26,25 @@ pub(crate) struct FrameBinding {
     block: Option<(wgpu::Buffer, Bound)>,
     /// With how many fit.
     lights: Option<(wgpu::Buffer, usize)>,
+    sun: Option<(wgpu::Buffer, Bound)>,
+}
+
+/// What programs share that are drawn in one pass.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shared<'a> {
+    pub environment: &'a Environment,
+    /// The picture that some programs read.
+    pub picture: Option<&'a wgpu::TextureView>,
+    /// What the sun does not reach; given where a program reads it.
+    pub shadow: Option<ShadowSource<'a>>,
 }
 
 impl FrameBinding {
     /// Binds the environment, and the picture that the program reads if it is one that does.
-    pub fn new(
-        gpu: &Gpu,
-        program: &Program,
-        environment: &Environment,
-        picture: Option<&wgpu::TextureView>,
-    ) -> Self {
+    pub fn new(gpu: &Gpu, program: &Program, shared: &Shared<'_>) -> Self {
+        let Shared { environment, picture, shadow } = *shared;
+        let sun = program.groups[0].iter().find(|bound| bound.slot == Slot::Sun);
+        let sun = sun.map(|bound| (uniform_buffer(gpu, bound, Vec::new()), bound.clone()));
         let frame = program.groups[0].iter().find(|bound| bound.slot == Slot::Frame);
         let block = frame.map(|bound| (uniform_buffer(gpu, bound, Vec::new()), bound.clone()));
         let lights = program.groups[0].iter().find_map(|bound| {
@@ -45,6 +55,11 @@ impl FrameBinding {
             let view = match bound.slot {
                 Slot::Frame => return block.as_ref().map(|(buffer, _)| buffer.as_entire_binding()),
                 Slot::Lights => return lights.as_ref().map(|(buffer, _)| buffer.as_entire_binding()),
+                Slot::Sun => return sun.as_ref().map(|(buffer, _)| buffer.as_entire_binding()),
+                Slot::SunShadowSampler => {
+                    return shadow.map(|shadow| wgpu::BindingResource::Sampler(shadow.sampler));
+                }
+                Slot::SunShadow => shadow.map(|shadow| shadow.view),
                 Slot::EnvSampler | Slot::LutSampler => {
                     return Some(wgpu::BindingResource::Sampler(&environment.sampler));
                 }
@@ -60,7 +75,7 @@ impl FrameBinding {
             view.map(wgpu::BindingResource::TextureView)
         };
         let group = create_group(gpu, program, 0, resource);
-        FrameBinding { group, own: program.own_group.clone(), block, lights }
+        FrameBinding { group, own: program.own_group.clone(), block, lights, sun }
     }
 
     /// Writes the lights as they are in this frame. Those beyond the room that the shader has are left out, the weakest first.
@@ -88,6 +103,10 @@ impl FrameBinding {
         }
         if let Some((buffer, Bound { block: Some((size_bytes, members)), .. })) = &self.block {
             gpu.queue.write_buffer(buffer, 0, &fill_block(*size_bytes, members, |name| values.member(name)));
+        }
+        if let Some((buffer, Bound { block: Some((size_bytes, members)), .. })) = &self.sun {
+            let block = fill_block(*size_bytes, members, |name| values.sun.member(name));
+            gpu.queue.write_buffer(buffer, 0, &block);
         }
     }
 }

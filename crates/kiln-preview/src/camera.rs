@@ -2,15 +2,16 @@
 
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
-use glam::camera::rh::proj::directx::perspective;
-use glam::camera::rh::view::look_at_mat4;
-use glam::{Mat4, Vec3};
+use glam::camera::rh::proj::directx::{orthographic, perspective};
+use glam::{Mat3, Mat4, Vec3};
 use kiln_scene::{Bounds, Camera, Scene};
 
 /// Vertical field of view where no camera of the file says another: a short telephoto, as for products.
 const FIELD_OF_VIEW_RAD: f32 = 35.0 * PI / 180.0;
 /// Pitch stops short of the poles, where "up" is not defined.
 const PITCH_MAX_RAD: f32 = FRAC_PI_2 - 0.01;
+/// How much farther than the target's distance the eye of parallel rays is for shaders: to them a scene is 1e-4 rad wide.
+const ORTHOGRAPHIC_DISTANCE: f32 = 1e4;
 /// Room left around the scene, as a factor of the distance at which it just fits.
 const FRAME_MARGIN: f32 = 1.06;
 
@@ -27,6 +28,10 @@ pub struct OrbitCamera {
     pub pitch_rad: f32,
     /// Vertical field of view.
     pub field_of_view_rad: f32,
+    /// Turns the picture clockwise about its middle.
+    pub roll_rad: f32,
+    /// Whether rays are parallel; it sees as much as the field of view does at the target.
+    pub is_orthographic: bool,
 }
 
 impl OrbitCamera {
@@ -37,37 +42,55 @@ impl OrbitCamera {
         yaw_rad: 0.0,
         pitch_rad: 0.0,
         field_of_view_rad: FIELD_OF_VIEW_RAD,
+        roll_rad: 0.0,
+        is_orthographic: false,
     };
 
-    /// The `index`th of the [named](Self::names) cameras, where `cameras` has it now (its roll is not kept); else one that
-    /// shows all of `bounds` from slightly above and beside its front. `aspect` = width / height.
+    /// The `index`th of the [named](Self::names) cameras, where `cameras` has it now; else one that shows all of `bounds` from slightly above and beside its front. `aspect` = width / height.
     pub fn for_scene(bounds: Option<Bounds>, cameras: &[Camera], index: usize, aspect: f32) -> Self {
         let bounds = bounds.unwrap_or(Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE });
-        let of_file = cameras.iter().filter(|camera| is_shown(camera)).nth(index);
+        let of_file = cameras.get(index);
         let of_file = of_file.and_then(|camera| Self::from_file(camera, bounds));
         of_file.unwrap_or_else(|| Self::framing(bounds, aspect))
     }
 
-    /// Names of the file's cameras that can be looked through: the perspective ones.
+    /// Names of the file's cameras.
     pub fn names(scene: &Scene) -> Vec<String> {
-        scene.cameras.iter().filter(|camera| is_shown(camera)).map(|camera| camera.name.clone()).collect()
+        scene.cameras.iter().map(|camera| camera.name.clone()).collect()
     }
 
     fn from_file(camera: &Camera, bounds: Bounds) -> Option<Self> {
-        let field_of_view_rad = camera.yfov_rad.filter(|angle| (0.01..3.1).contains(angle))?;
         let eye = camera.world.w_axis.truncate();
-        let forward = (-camera.world.z_axis.truncate()).try_normalize()?;
-        let along = (center(bounds) - eye).dot(forward);
+        let back = camera.world.z_axis.truncate().try_normalize()?;
+        let along = (eye - center(bounds)).dot(back);
         // Turning around a point in the middle of the scene feels right; one behind the eye would not.
         let distance = if along > 0.0 { along } else { diagonal(bounds) };
-        let camera = OrbitCamera {
-            target: eye + forward * distance,
+        let right = camera.world.x_axis.truncate().try_normalize()?;
+        // Straight up and down, where to is left to the roll's axis.
+        let is_level = back.x.hypot(back.z) > 1e-4;
+        let facing =
+            if is_level { Vec3::new(back.x, 0.0, back.z) } else { Vec3::new(-right.z, 0.0, right.x) };
+        let mut found = OrbitCamera {
+            target: eye - back * distance,
             distance,
-            yaw_rad: (-forward.x).atan2(-forward.z),
-            pitch_rad: (-forward.y).clamp(-1.0, 1.0).asin().clamp(-PITCH_MAX_RAD, PITCH_MAX_RAD),
-            field_of_view_rad,
+            yaw_rad: facing.x.atan2(facing.z),
+            pitch_rad: back.y.clamp(-1.0, 1.0).asin(),
+            ..Self::BACKGROUND_ONLY
         };
-        (camera.target.is_finite() && distance.is_finite() && distance > 0.0).then_some(camera)
+        let (level_right, level_up, _) = found.axes();
+        found.roll_rad = right.dot(level_up).atan2(right.dot(level_right));
+        found.field_of_view_rad = match (camera.yfov_rad, camera.ymag) {
+            (Some(angle), _) => angle,
+            (None, Some(half_height)) => {
+                found.is_orthographic = true;
+                // How far away the eye is shows in nothing but in how far hands move it.
+                found.distance = half_height.abs() / (FIELD_OF_VIEW_RAD / 2.0).tan();
+                FIELD_OF_VIEW_RAD
+            }
+            (None, None) => return None,
+        };
+        let is_usable = found.target.is_finite() && found.distance.is_finite() && found.distance > 0.0;
+        (is_usable && (1e-3..3.1).contains(&found.field_of_view_rad)).then_some(found)
     }
 
     /// Shows the whole box from slightly above and beside its front.
@@ -77,7 +100,7 @@ impl OrbitCamera {
             distance: 1.0,
             yaw_rad: 0.5,
             pitch_rad: 0.25,
-            field_of_view_rad: FIELD_OF_VIEW_RAD,
+            ..Self::BACKGROUND_ONLY
         };
         camera.distance = camera.fitting_distance(bounds, aspect).max(1e-4) * FRAME_MARGIN;
         camera
@@ -102,27 +125,47 @@ impl OrbitCamera {
         let (sin_pitch, cos_pitch) = self.pitch_rad.sin_cos();
         let back = Vec3::new(sin_yaw * cos_pitch, sin_pitch, cos_yaw * cos_pitch);
         let right = Vec3::new(cos_yaw, 0.0, -sin_yaw);
-        (right, back.cross(right), back)
+        let up = back.cross(right);
+        let (sin_roll, cos_roll) = self.roll_rad.sin_cos();
+        (right * cos_roll + up * sin_roll, up * cos_roll - right * sin_roll, back)
     }
 
-    /// Where the eye is.
+    /// Where the eye is; where rays are parallel, so far away that they are to shaders.
     pub fn position(&self) -> Vec3 {
+        let factor = if self.is_orthographic { ORTHOGRAPHIC_DISTANCE } else { 1.0 };
+        self.target + self.axes().2 * (self.distance * factor)
+    }
+
+    /// Where depth is measured from.
+    fn eye(&self) -> Vec3 {
         self.target + self.axes().2 * self.distance
     }
 
     /// World to clip space, depth 0 at the near plane; the planes are as tight around `bounds` as the eye allows.
     pub fn clip_from_world(&self, bounds: Option<Bounds>, aspect: f32) -> Mat4 {
         let (near, far) = self.depth_range(bounds);
-        let view = look_at_mat4(self.position(), self.target, Vec3::Y);
+        let (right, up, back) = self.axes();
+        let rotation = Mat3::from_cols(right, up, back).transpose();
+        let view = Mat4::from_mat3(rotation) * Mat4::from_translation(-self.eye());
+        if self.is_orthographic {
+            let half_height = self.distance * (self.field_of_view_rad / 2.0).tan();
+            let half_width = half_height * aspect;
+            return orthographic(-half_width, half_width, -half_height, half_height, near, far) * view;
+        }
         perspective(self.field_of_view_rad, aspect, near, far) * view
     }
 
     fn depth_range(&self, bounds: Option<Bounds>) -> (f32, f32) {
         let Some(bounds) = bounds else { return (self.distance * 0.01, self.distance * 100.0) };
-        let (eye, back) = (self.position(), self.axes().2);
+        let (eye, back) = (self.eye(), self.axes().2);
         let depths = corners(bounds).map(|corner| (eye - corner).dot(back));
         let nearest = depths.into_iter().fold(f32::INFINITY, f32::min);
-        let farthest = depths.into_iter().fold(0.0, f32::max).max(self.distance);
+        let farthest = depths.into_iter().fold(f32::NEG_INFINITY, f32::max);
+        if self.is_orthographic {
+            let margin = 0.01 * (farthest - nearest).max(1e-3 * self.distance);
+            return (nearest - margin, farthest + margin);
+        }
+        let farthest = farthest.max(self.distance);
         // A ratio of 10⁴ keeps 32-bit depth far from fighting.
         let near = (nearest * 0.99).max(farthest * 1e-4);
         (near, (farthest * 1.01).max(near * 1.1))
@@ -147,10 +190,6 @@ impl OrbitCamera {
     }
 }
 
-fn is_shown(camera: &Camera) -> bool {
-    camera.yfov_rad.is_some()
-}
-
 fn center(bounds: Bounds) -> Vec3 {
     (bounds.min + bounds.max) / 2.0
 }
@@ -159,7 +198,7 @@ fn diagonal(bounds: Bounds) -> f32 {
     (bounds.max - bounds.min).length()
 }
 
-fn corners(bounds: Bounds) -> [Vec3; 8] {
+pub(crate) fn corners(bounds: Bounds) -> [Vec3; 8] {
     std::array::from_fn(|corner| {
         let pick = |bit: usize, min: f32, max: f32| if corner & bit == 0 { min } else { max };
         Vec3::new(

@@ -31,6 +31,8 @@ pub(crate) struct DrawItem {
     /// Index into [`Pose::draws`].
     pub draw: usize,
     pub instance_count: u32,
+    /// Draws its depth for the sun; `None` where none shines or the draw casts no shadow.
+    pub shadow_pipeline: Option<wgpu::RenderPipeline>,
 }
 
 /// What all draws of a program share.
@@ -60,14 +62,26 @@ pub(crate) struct DrawList {
 pub(crate) type FindProgram<'a> = &'a mut dyn FnMut(&EffectSet) -> Option<Arc<Program>>;
 
 impl DrawList {
+    /// Whether anything reads what the sun does not reach.
+    pub fn reads_sun_shadow(&self) -> bool {
+        self.programs.iter().any(|binding| binding.program.reads_sun_shadow())
+    }
+
     /// Whether anything reads what is opaque behind it.
     pub fn reads_scene_color(&self) -> bool {
         self.programs.iter().any(|binding| binding.program.reads_scene_color())
     }
 
     /// Resolves every draw of the scene with the materials that it has in `variant`; draws without a program are left out.
-    pub fn new(gpu: &Gpu, scene: &GpuScene, variant: Option<usize>, find_program: FindProgram<'_>) -> Self {
-        let mut plan = Plan::default();
+    /// `has_sun` if some of them cast shadows.
+    pub fn new(
+        gpu: &Gpu,
+        scene: &GpuScene,
+        variant: Option<usize>,
+        has_sun: bool,
+        find_program: FindProgram<'_>,
+    ) -> Self {
+        let mut plan = Plan { has_sun, ..Plan::default() };
         for (index, draw) in all_draws(&scene.scene).enumerate() {
             let material = scene.scene.material_of(draw, variant);
             if let Some(program) = find_program(&scene.scene.effects(draw, material)) {
@@ -96,6 +110,7 @@ struct Plan {
     draws: Vec<(usize, usize, usize)>,
     /// With the numbers of their draws.
     programs: Vec<(Arc<Program>, Vec<usize>)>,
+    has_sun: bool,
 }
 
 impl Plan {
@@ -130,6 +145,9 @@ impl Plan {
             let copies = if shared.reads_of_draw(Slot::Instances) { draw.instances.len().max(1) } else { 1 };
             let influences = shared.reads_influences().then(|| scene.influences(gpu, draw.primitive));
             let material = &scene.scene.materials[material];
+            let casts_shadow =
+                self.has_sun && material.alpha_mode != AlphaMode::Blend && !shared.reads_scene_color();
+            let is_masked = matches!(material.alpha_mode, AlphaMode::Mask { .. });
             let item = |raster| DrawItem {
                 pipeline: shared.pipeline(&gpu.device, raster),
                 raster,
@@ -141,6 +159,7 @@ impl Plan {
                 influences: influences.clone(),
                 draw: index,
                 instance_count: copies as u32,
+                shadow_pipeline: casts_shadow.then(|| shared.shadow_pipeline(&gpu.device, is_masked)),
             };
             let items = rasters(pose.draws[index].mirrored, material).into_iter().map(item);
             let group = match material.alpha_mode {

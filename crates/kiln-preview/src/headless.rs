@@ -126,6 +126,12 @@ impl HeadlessViewer {
         self.renderer.draws_scene_color()
     }
 
+    /// Whether frames have a pass for what the sun does not reach.
+    #[cfg(test)]
+    pub(crate) fn draws_shadow(&self) -> bool {
+        self.renderer.draws_shadow()
+    }
+
     /// The device it draws on.
     pub fn gpu(&self) -> &Gpu {
         &self.gpu

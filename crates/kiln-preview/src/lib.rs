@@ -23,15 +23,17 @@ pub use parameter::{OfferedParameter, ParameterValues};
 pub use report::{ApplyReport, OfferedAnimation};
 pub use run::{HeadlessOptions, HeadlessReport, run_headless};
 pub use upload::Uploaded;
-pub use view::{AnimationTime, DiffuseSource, Selection, View};
+pub use view::{AnimationTime, Background, DiffuseSource, Ground, Selection, View};
 pub use window::{WindowOptions, run_window};
 
 mod assignment;
+mod backdrop;
 mod binding;
 mod camera;
 mod connection;
 mod draw_list;
 mod frame_watcher;
+mod ground;
 mod harmonics;
 mod headless;
 mod keeper;
@@ -50,7 +52,9 @@ mod report;
 mod run;
 mod scene_color;
 mod scene_gpu;
+mod shadow;
 mod slot;
+mod sun;
 mod target;
 #[cfg(test)]
 mod tests;

@@ -18,6 +18,7 @@ use crate::parameter::{OfferedParameter, ParameterValues};
 use crate::program::{Program, Raster};
 use crate::report::{ApplyReport, choose, describe};
 use crate::scene_gpu::GpuScene;
+use crate::sun::Sun;
 use crate::target::{CubeMeta, LutMeta, ProjectMeta, Role, SceneMeta, ShaderMeta, read_meta};
 use crate::texture::{CubeTexture, LutTexture, create_trilinear_sampler};
 use crate::upload::Uploader;
@@ -33,6 +34,8 @@ pub(crate) struct Environment {
     pub lut_ggx: Arc<LutTexture>,
     pub lut_charlie: Arc<LutTexture>,
     pub sampler: wgpu::Sampler,
+    /// If it is a light of its own.
+    pub sun: Option<Sun>,
 }
 
 /// One selection of a revision, ready to be drawn.
@@ -128,7 +131,12 @@ impl Preparer {
             report.describe_scene(&scene.scene);
             choose_variant(selection.variant.as_deref(), &mut report)
         });
-        let draws = scene.as_ref().map(|scene| self.draws(revision, scene, variant, &shader, &mut report));
+        let sun = environment.sun.and(env.as_deref());
+        report.has_sun = sun.is_some();
+        let draws = scene.as_ref().map(|scene| {
+            let wish = Wish { variant, shader: &shader, sun };
+            self.draws(revision, scene, &wish, &mut report)
+        });
         let variant = variant.map(|index| report.variants[index].clone());
         report.shown = Selection { scene: scene_name, env, variant, diffuse: selection.diffuse };
         // A scene's notes stand in its facts and in its GLB.
@@ -200,7 +208,11 @@ impl Preparer {
             false => Arc::clone(&self.neutral_lut),
         };
         let sampler = self.sampler.clone();
-        Environment { skybox, irradiance, specular, sheen, lut_ggx, lut_charlie, sampler }
+        let sun = env.map_or(Ok(None), |env| Sun::of(revision, env)).unwrap_or_else(|fault| {
+            report.diagnostics.push(fault);
+            None
+        });
+        Environment { skybox, irradiance, specular, sheen, lut_ggx, lut_charlie, sampler, sun }
     }
 
     fn cube(&mut self, revision: &Revision, name: &str, report: &mut ApplyReport) -> Arc<CubeTexture> {
@@ -328,22 +340,33 @@ impl Preparer {
         &mut self,
         revision: &Revision,
         scene: &GpuScene,
-        variant: Option<usize>,
-        shader: &str,
+        wish: &Wish<'_>,
         report: &mut ApplyReport,
     ) -> DrawList {
+        let &Wish { variant, shader, sun } = wish;
         let mut found: HashMap<String, Option<Arc<Program>>> = HashMap::new();
         let gpu = self.uploader.gpu.clone();
         let overrides = project_meta(revision).effects;
+        let is_there = |name: &String| revision.table.targets.contains_key(name);
+        let mut is_without_sun = false;
         let mut find = |effects: &EffectSet| {
-            let name = format!("shader/{shader}/{}", variant_name(&overrides.apply(effects)));
+            let effects = overrides.apply(effects);
+            let in_sun = overrides.under_sun(&effects);
+            let has_sun = sun.is_some() && in_sun != effects;
+            // The scene may be shown in the light of an environment that it was not planned for.
+            let sets = if has_sun { [&in_sun, &effects] } else { [&effects, &in_sun] };
+            let names = sets.map(|effects| format!("shader/{shader}/{}", variant_name(effects)));
+            let name = names.iter().find(|name| is_there(name)).unwrap_or(&names[0]).clone();
             if !found.contains_key(&name) {
                 let program = self.variant(revision, shader, &name, report);
                 found.insert(name.clone(), program);
             }
-            found[&name].clone()
+            let program = found[&name].clone();
+            is_without_sun |= has_sun && program.as_ref().is_some_and(|program| !program.reads_sun());
+            program
         };
-        let (draws, fault) = gpu.catch_errors(|| DrawList::new(&gpu, scene, variant, &mut find));
+        let (draws, fault) =
+            gpu.catch_errors(|| DrawList::new(&gpu, scene, variant, sun.is_some(), &mut find));
         let faulty =
             |fault: String| Diagnostic::error("the scene cannot be bound to its shaders").with_note(fault);
         report.diagnostics.extend(fault.map(faulty));
@@ -351,6 +374,11 @@ impl Preparer {
             let effect = effect.name();
             report.notes.push(format!(
                 "`{effect}` of {count} draws is not drawn: `shader/{shader}` reads nothing of it, see docs/shader-interface.md"
+            ));
+        }
+        if let Some(env) = sun.filter(|_| is_without_sun) {
+            report.notes.push(format!(
+                "the sun that was taken out of env/{env} does not light all of the scene: `shader/{shader}` reads no `sun`, or has no variant for it, see docs/shader-interface.md"
             ));
         }
         let count = scene.scene.lights.len();
@@ -395,6 +423,15 @@ impl Preparer {
         self.scenes.retain(&revision.table, is_kept);
         self.programs.retain(&revision.table, |_| true);
     }
+}
+
+/// How a scene is to be drawn.
+struct Wish<'a> {
+    /// Index of the material variant.
+    variant: Option<usize>,
+    shader: &'a str,
+    /// The environment, if its sun is a light.
+    sun: Option<&'a str>,
 }
 
 fn project_meta(revision: &Revision) -> ProjectMeta {

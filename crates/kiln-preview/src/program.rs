@@ -12,6 +12,7 @@ use crate::lights;
 use crate::own::{OwnGroup, OwnTextures};
 use crate::parameter::{OfferedParameter, ParameterValues, offered};
 use crate::slot::Slot;
+use crate::sun::SunValues;
 use crate::target::Role;
 use crate::uniform::{FrameValues, Value, draw_member, long_type_name, material_member};
 use crate::vertex_input::VertexInputs;
@@ -105,6 +106,8 @@ pub(crate) struct Program {
 struct Pipelines {
     constants: Vec<(String, f64)>,
     by_raster: HashMap<Raster, wgpu::RenderPipeline>,
+    /// Depth alone, by whether fragments may be discarded.
+    of_shadow: HashMap<bool, wgpu::RenderPipeline>,
 }
 
 impl Program {
@@ -149,7 +152,11 @@ impl Program {
             notes,
             overrides,
             pipeline_layout,
-            pipelines: Mutex::new(Pipelines { constants, by_raster: HashMap::new() }),
+            pipelines: Mutex::new(Pipelines {
+                constants,
+                by_raster: HashMap::new(),
+                of_shadow: HashMap::new(),
+            }),
         })
     }
 
@@ -168,7 +175,8 @@ impl Program {
                 constants.iter().map(|(name, value)| format!("{name} = {value}")).collect();
             fault.with_note(format!("its overrides were set: {}", set.join(", ")))
         })?;
-        *self.pipelines() = Pipelines { constants, by_raster: [(raster, pipeline)].into() };
+        *self.pipelines() =
+            Pipelines { constants, by_raster: [(raster, pipeline)].into(), of_shadow: HashMap::new() };
         Ok(())
     }
 
@@ -179,8 +187,27 @@ impl Program {
     /// The pipeline for a raster state, created on first use.
     pub fn pipeline(&self, device: &wgpu::Device, raster: Raster) -> wgpu::RenderPipeline {
         let mut pipelines = self.pipelines();
-        let Pipelines { constants, by_raster } = &mut *pipelines;
+        let Pipelines { constants, by_raster, .. } = &mut *pipelines;
         by_raster.entry(raster).or_insert_with(|| self.create_pipeline(device, raster, constants)).clone()
+    }
+
+    /// The pipeline that draws depth alone, created on first use. Both sides of a surface cast its shadow; `is_masked` runs the
+    /// fragment stage for what it discards.
+    pub fn shadow_pipeline(&self, device: &wgpu::Device, is_masked: bool) -> wgpu::RenderPipeline {
+        let mut pipelines = self.pipelines();
+        let Pipelines { constants, of_shadow, .. } = &mut *pipelines;
+        let create = || self.create_shadow_pipeline(device, is_masked, constants);
+        of_shadow.entry(is_masked).or_insert_with(create).clone()
+    }
+
+    /// Whether it reads the sun.
+    pub fn reads_sun(&self) -> bool {
+        self.groups[0].iter().any(|bound| bound.slot == Slot::Sun)
+    }
+
+    /// Whether it reads what the sun does not reach.
+    pub fn reads_sun_shadow(&self) -> bool {
+        self.groups[0].iter().any(|bound| bound.slot == Slot::SunShadow)
     }
 
     /// Whether pictures change with time.
@@ -247,6 +274,39 @@ impl Program {
                     blend: raster.blend.then_some(wgpu::BlendState::ALPHA_BLENDING),
                     write_mask: wgpu::ColorWrites::ALL,
                 })],
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+    }
+
+    fn create_shadow_pipeline(
+        &self,
+        device: &wgpu::Device,
+        is_masked: bool,
+        constants: &[(String, f64)],
+    ) -> wgpu::RenderPipeline {
+        let constants: Vec<(&str, f64)> =
+            constants.iter().map(|(name, value)| (name.as_str(), *value)).collect();
+        let options = wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() };
+        let buffers = self.inputs.layouts();
+        device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some("sun shadow"),
+            layout: Some(&self.pipeline_layout),
+            vertex: wgpu::VertexState {
+                module: &self.module,
+                entry_point: Some("vs_main"),
+                compilation_options: options.clone(),
+                buffers: &buffers,
+            },
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: Some(self.depth_state(Raster::of_role(Role::Material))),
+            multisample: wgpu::MultisampleState::default(),
+            fragment: is_masked.then_some(wgpu::FragmentState {
+                module: &self.module,
+                entry_point: Some("fs_main"),
+                compilation_options: options,
+                targets: &[],
             }),
             multiview_mask: None,
             cache: None,
@@ -347,7 +407,11 @@ fn check_binding(shader: &str, role: Role, binding: &Binding) -> Result<Slot, Di
                 "names that can be bound are listed in docs/shader-interface.md; your own stand in group 3",
             ));
     };
-    let is_of_material = [1, 2].contains(&slot.group()) || matches!(slot, Slot::Lights | Slot::SceneColor);
+    let is_of_material = [1, 2].contains(&slot.group())
+        || matches!(
+            slot,
+            Slot::Lights | Slot::SceneColor | Slot::Sun | Slot::SunShadow | Slot::SunShadowSampler
+        );
     if is_of_material && role != Role::Material {
         return Err(Diagnostic::error(format!("`{shader}` declares `{name}`, which only materials have")));
     }
@@ -414,6 +478,7 @@ fn example_of(slot: Slot, member: &str) -> Option<Value> {
     match slot {
         Slot::Frame => FrameValues::default().member(member),
         Slot::Material => material_member(&crate::neutral::material(), member),
+        Slot::Sun => SunValues::default().member(member),
         Slot::Draw => draw_member(glam::Mat4::IDENTITY, member),
         _ => None,
     }
@@ -465,7 +530,7 @@ fn binding_type(bound: &Bound) -> wgpu::BindingType {
         multisampled: false,
     };
     match bound.slot {
-        Slot::Frame | Slot::Lights | Slot::Material | Slot::Draw | Slot::Params => {
+        Slot::Frame | Slot::Lights | Slot::Sun | Slot::Material | Slot::Draw | Slot::Params => {
             wgpu::BindingType::Buffer {
                 ty: wgpu::BufferBindingType::Uniform,
                 // Draws share one buffer, each at its own offset.
@@ -489,6 +554,12 @@ fn binding_type(bound: &Bound) -> wgpu::BindingType {
         | Slot::SceneColor
         | Slot::MaterialTexture(_)
         | Slot::OwnTexture => texture(wgpu::TextureViewDimension::D2),
+        Slot::SunShadow => wgpu::BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Depth,
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
+        },
+        Slot::SunShadowSampler => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison),
         Slot::EnvSampler | Slot::LutSampler | Slot::MaterialSampler(_) | Slot::OwnSampler => {
             wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)
         }

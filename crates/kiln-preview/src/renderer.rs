@@ -7,16 +7,20 @@ use std::sync::Arc;
 use glam::{Mat4, Vec3};
 use kiln_gpu::Gpu;
 
-use crate::binding::FrameBinding;
+use crate::backdrop::Backdrop;
+use crate::binding::{FrameBinding, Shared};
 use crate::camera::OrbitCamera;
 use crate::draw_list::{DrawItem, DrawList, front_face};
+use crate::ground::{Floor, GroundPainter};
 use crate::pose::Pose;
 use crate::prepare::Prepared;
 use crate::program::{DEPTH_FORMAT, HDR_FORMAT, OUTPUT_FORMAT, Program, Raster, SAMPLE_COUNT};
 use crate::scene_color::{Downsampler, SceneColor};
 use crate::scene_gpu::GpuScene;
+use crate::shadow::{Contents, Frustum, ShadowMap, ShadowReader};
+use crate::sun::{Sun, SunValues};
 use crate::uniform::FrameValues;
-use crate::view::{AnimationTime, View};
+use crate::view::{AnimationTime, Background, Ground, View};
 
 /// Draws one prepared revision after another; what it shows changes only by [`Renderer::show`].
 #[derive(Debug)]
@@ -26,6 +30,12 @@ pub(crate) struct Renderer {
     shown: Option<Shown>,
     /// Made for the first scene that transmits light.
     downsampler: OnceCell<Downsampler>,
+    /// Made for the first program that reads the sun.
+    shadow_reader: OnceCell<ShadowReader>,
+    /// Made for the first view with another background than the environment.
+    backdrop: OnceCell<Backdrop>,
+    /// Made for the first view with a floor.
+    ground: OnceCell<GroundPainter>,
 }
 
 /// What is shown, bound to the picture.
@@ -41,6 +51,8 @@ struct Shown {
     pose: Option<Pose>,
     /// What the device has of the pose; `None` = not known.
     written: Option<Option<AnimationTime>>,
+    /// If something reads it.
+    shadow: Option<ShadowMap>,
 }
 
 /// How the scene is drawn: at once, or with a picture of what is opaque between.
@@ -49,6 +61,13 @@ enum Stage {
     Whole,
     Opaque,
     Rest,
+}
+
+/// What a view has behind the scene, of the preview's own.
+struct Behind<'a> {
+    /// Instead of the environment.
+    backdrop: Option<&'a Backdrop>,
+    ground: Option<(&'a GroundPainter, Ground)>,
 }
 
 /// The images a frame goes through.
@@ -69,7 +88,15 @@ impl Renderer {
     /// A renderer that shows nothing yet. `size` is width and height in pixels.
     pub fn new(gpu: &Gpu, size: [u32; 2]) -> Self {
         let picture = Picture::new(gpu, size);
-        Renderer { gpu: gpu.clone(), picture, shown: None, downsampler: OnceCell::new() }
+        Renderer {
+            gpu: gpu.clone(),
+            picture,
+            shown: None,
+            downsampler: OnceCell::new(),
+            shadow_reader: OnceCell::new(),
+            backdrop: OnceCell::new(),
+            ground: OnceCell::new(),
+        }
     }
 
     /// Changes the picture's size, limited to what the device takes; true if it changed.
@@ -92,7 +119,14 @@ impl Renderer {
             let downsampler = self.downsampler.get_or_init(|| Downsampler::new(&self.gpu));
             SceneColor::new(&self.gpu, downsampler, self.picture.size)
         });
-        let bind = |program: &Program, picture| FrameBinding::new(&self.gpu, program, environment, picture);
+        let reader = draws.reads_sun_shadow() || environment.sun.is_some();
+        let reader = reader.then(|| self.shadow_reader.get_or_init(|| ShadowReader::new(&self.gpu)));
+        let shadow = reader.filter(|_| environment.sun.is_some());
+        let shadow = shadow.map(|reader| ShadowMap::new(&self.gpu, &prepared, reader));
+        let read = reader.map(|reader| reader.source(shadow.as_ref()));
+        let bind = |program: &Program, picture| {
+            FrameBinding::new(&self.gpu, program, &Shared { environment, picture, shadow: read })
+        };
         let behind = scene_color.as_ref().map(|scene| &scene.view);
         self.shown = Some(Shown {
             background: prepared.background.as_ref().map(|(_, program)| bind(program, None)),
@@ -101,6 +135,7 @@ impl Renderer {
             scene_color,
             pose: prepared.scene.as_deref().map(Pose::at_rest),
             written: None,
+            shadow,
             prepared,
         });
     }
@@ -114,6 +149,12 @@ impl Renderer {
     #[cfg(test)]
     pub fn draws_scene_color(&self) -> bool {
         self.shown.as_ref().is_some_and(|shown| shown.scene_color.is_some())
+    }
+
+    /// Whether frames have a pass for what the sun does not reach.
+    #[cfg(test)]
+    pub fn draws_shadow(&self) -> bool {
+        self.shown.as_ref().is_some_and(|shown| shown.shadow.is_some())
     }
 
     /// The finished picture: `Rgba8Unorm`, sRGB-encoded values.
@@ -160,14 +201,17 @@ impl Renderer {
             shown.programs.iter().for_each(|frame| frame.write_lights(&self.gpu, &scene.scene, lights));
         }
         let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        shown.sort_copies(&self.gpu, values.camera_position);
+        self.draw_shadow(&mut encoder, shown, &values, view);
+        let behind = self.behind(shown, &values, view);
         let eye = values.camera_position;
         match (&shown.scene_color, self.downsampler.get()) {
             (Some(scene_color), Some(downsampler)) => {
-                self.draw_scene(&mut encoder, shown, Stage::Opaque, scene_color.base(), eye);
+                self.draw_scene(&mut encoder, shown, &behind, Stage::Opaque, scene_color.base(), eye);
                 downsampler.run(&mut encoder, scene_color);
-                self.draw_scene(&mut encoder, shown, Stage::Rest, &self.picture.hdr, eye);
+                self.draw_scene(&mut encoder, shown, &behind, Stage::Rest, &self.picture.hdr, eye);
             }
-            _ => self.draw_scene(&mut encoder, shown, Stage::Whole, &self.picture.hdr, eye),
+            _ => self.draw_scene(&mut encoder, shown, &behind, Stage::Whole, &self.picture.hdr, eye),
         }
         self.draw_tonemap(&mut encoder, shown);
         Some(self.gpu.queue.submit([encoder.finish()]))
@@ -177,6 +221,9 @@ impl Renderer {
         let prepared = &shown.prepared;
         let environment = &prepared.environment;
         let bounds = shown.pose.as_ref().and_then(|pose| pose.bounds);
+        // What is drawn on the floor reaches farther than the scene.
+        let floor = shown.floor(view);
+        let bounds = bounds.map(|bounds| floor.map_or(bounds, |floor| floor.beside(bounds)));
         let camera = self.camera(view).unwrap_or(OrbitCamera::BACKGROUND_ONLY);
         FrameValues {
             clip_from_world: camera.clip_from_world(bounds, self.aspect()),
@@ -192,6 +239,59 @@ impl Renderer {
             background_blur: environment.specular.nearest_roughness(view.background_blur),
             viewport_size: self.picture.size.map(|pixels| pixels as f32),
             time_s: view.time_s,
+            sun: self.sun(shown, view).map(|(sun, frustum)| SunValues::new(sun, frustum)).unwrap_or_default(),
+        }
+    }
+
+    /// What the view has behind the scene, its values written.
+    fn behind(&self, shown: &Shown, values: &FrameValues, view: &View) -> Behind<'_> {
+        let backdrop = (view.background != Background::Environment)
+            .then(|| self.backdrop.get_or_init(|| Backdrop::new(&self.gpu)));
+        if let Some(backdrop) = backdrop {
+            backdrop.write(&self.gpu, view);
+        }
+        let ground = shown.floor(view).map(|floor| {
+            let painter = self.ground.get_or_init(|| GroundPainter::new(&self.gpu));
+            painter.write(&self.gpu, floor, values, view.background);
+            (painter, view.ground)
+        });
+        Behind { backdrop, ground }
+    }
+
+    /// The sun, and the light that falls on the scene.
+    fn sun(&self, shown: &Shown, view: &View) -> Option<(Sun, Frustum)> {
+        let sun = shown.prepared.environment.sun?.in_view(view);
+        let bounds = shown.pose.as_ref()?.bounds?;
+        Some((sun, Frustum::around(bounds, sun.direction)))
+    }
+
+    /// Fills the shadow map, if anything reads it.
+    fn draw_shadow(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        shown: &Shown,
+        values: &FrameValues,
+        view: &View,
+    ) {
+        let (Some(shadow), Some((_, frustum))) = (&shown.shadow, self.sun(shown, view)) else { return };
+        if !(shown.prepared.draws.reads_sun_shadow() || view.ground.catches_shadow) {
+            return;
+        }
+        let (Some(scene), Some(pose)) = (&shown.prepared.scene, &shown.pose) else { return };
+        // Most frames move the eye alone.
+        let animation = shown.written.flatten();
+        let contents = Contents { frustum, animation, parameters: view.parameters.clone() };
+        if !shadow.takes(contents) && !shown.prepared.is_animated {
+            return;
+        }
+        let values = frustum.values(values);
+        shadow.frames.iter().for_each(|frame| frame.write(&self.gpu, &values, &view.parameters));
+        let mut pass = shadow.begin(encoder);
+        for item in shown.prepared.draws.opaque.iter().filter(|item| pose.draws[item.draw].visible) {
+            if let Some(pipeline) = &item.shadow_pipeline {
+                pass.set_pipeline(pipeline);
+                draw_geometry(&mut pass, &shadow.frames, scene, item);
+            }
         }
     }
 
@@ -199,13 +299,18 @@ impl Renderer {
         &self,
         encoder: &mut wgpu::CommandEncoder,
         shown: &Shown,
+        behind: &Behind<'_>,
         stage: Stage,
         resolved: &wgpu::TextureView,
         eye: Vec3,
     ) {
         // Without a background nothing else makes the picture opaque.
         let empty = wgpu::Color {
-            a: if stage == Stage::Opaque && shown.background.is_some() { 0.0 } else { 1.0 },
+            a: if stage == Stage::Opaque && (behind.backdrop.is_some() || shown.background.is_some()) {
+                0.0
+            } else {
+                1.0
+            },
             ..wgpu::Color::BLACK
         };
         let store = if stage == Stage::Opaque { wgpu::StoreOp::Store } else { wgpu::StoreOp::Discard };
@@ -227,7 +332,7 @@ impl Renderer {
             ..Default::default()
         });
         // Opaque draws from near to far, so that depth saves shading; others from far to near.
-        let Some(pose) = &shown.pose else { return self.draw_background(&mut pass, shown) };
+        let Some(pose) = &shown.pose else { return self.draw_background(&mut pass, shown, behind) };
         let distance = |item: &DrawItem| pose.draws[item.draw].center.distance_squared(eye);
         let near_first = |items| visible(items, pose, |a, b| distance(a).total_cmp(&distance(b)));
         let far_first = |items| visible(items, pose, |a, b| distance(b).total_cmp(&distance(a)));
@@ -236,14 +341,18 @@ impl Renderer {
             self.draw_items(&mut pass, shown, near_first(opaque));
         }
         if stage != Stage::Opaque {
-            self.draw_background(&mut pass, shown);
+            self.draw_background(&mut pass, shown, behind);
+            self.draw_ground(&mut pass, shown, behind);
             self.draw_items(&mut pass, shown, far_first(transmissive));
             self.draw_items(&mut pass, shown, far_first(blended));
         }
     }
 
     /// Fills what is still open. The viewport puts it on the far plane, at whatever depth its author chose.
-    fn draw_background(&self, pass: &mut wgpu::RenderPass<'_>, shown: &Shown) {
+    fn draw_background(&self, pass: &mut wgpu::RenderPass<'_>, shown: &Shown, behind: &Behind<'_>) {
+        if let Some(backdrop) = behind.backdrop {
+            return backdrop.draw(pass);
+        }
         let (Some((pipeline, _)), Some(frame)) = (&shown.prepared.background, &shown.background) else {
             return;
         };
@@ -253,6 +362,13 @@ impl Renderer {
         frame.set(pass);
         pass.draw(0..3, 0..1);
         pass.set_viewport(0.0, 0.0, width, height, 0.0, 1.0);
+    }
+
+    fn draw_ground(&self, pass: &mut wgpu::RenderPass<'_>, shown: &Shown, behind: &Behind<'_>) {
+        let Some((painter, ground)) = behind.ground else { return };
+        let shadow = shown.shadow.as_ref();
+        let shadow = shadow.and_then(|map| Some(self.shadow_reader.get()?.source(Some(map))));
+        painter.draw(&self.gpu, pass, ground, &shown.prepared.environment, shadow.as_ref());
     }
 
     fn draw_items(&self, pass: &mut wgpu::RenderPass<'_>, shown: &Shown, items: Vec<&DrawItem>) {
@@ -278,20 +394,7 @@ impl Renderer {
             let program = &shown.prepared.draws.programs[item.program].program;
             pass.set_pipeline(&program.pipeline(&self.gpu.device, raster));
         }
-        shown.programs[item.program].set(pass);
-        if let Some(group) = &item.material_group {
-            pass.set_bind_group(1, group, &[]);
-        }
-        if let Some(group) = &item.draw_group {
-            pass.set_bind_group(2, group, item.draw_offset.as_slice());
-        }
-        let mesh = &scene.meshes[item.mesh];
-        pass.set_vertex_buffer(0, mesh.vertices.slice(..));
-        if let Some(influences) = &item.influences {
-            pass.set_vertex_buffer(1, influences.slice(..));
-        }
-        pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
-        pass.draw_indexed(0..mesh.index_count, 0, 0..item.instance_count);
+        draw_geometry(pass, &shown.programs, scene, item);
     }
 
     fn draw_tonemap(&self, encoder: &mut wgpu::CommandEncoder, shown: &Shown) {
@@ -311,6 +414,29 @@ impl Renderer {
     }
 }
 
+/// Draws with the pipeline that is set. `frames` are those of each program.
+fn draw_geometry(
+    pass: &mut wgpu::RenderPass<'_>,
+    frames: &[FrameBinding],
+    scene: &GpuScene,
+    item: &DrawItem,
+) {
+    frames[item.program].set(pass);
+    if let Some(group) = &item.material_group {
+        pass.set_bind_group(1, group, &[]);
+    }
+    if let Some(group) = &item.draw_group {
+        pass.set_bind_group(2, group, item.draw_offset.as_slice());
+    }
+    let mesh = &scene.meshes[item.mesh];
+    pass.set_vertex_buffer(0, mesh.vertices.slice(..));
+    if let Some(influences) = &item.influences {
+        pass.set_vertex_buffer(1, influences.slice(..));
+    }
+    pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
+    pass.draw_indexed(0..mesh.index_count, 0, 0..item.instance_count);
+}
+
 /// What is to be seen, in this order.
 fn visible<'a>(
     items: &'a [DrawItem],
@@ -323,6 +449,20 @@ fn visible<'a>(
 }
 
 impl Shown {
+    /// Orders copies that are blended over each other; those of one draw are drawn in the order of their matrices.
+    fn sort_copies(&self, gpu: &Gpu, eye: Vec3) {
+        let (Some(scene), Some(pose)) = (&self.prepared.scene, &self.pose) else { return };
+        for item in self.prepared.draws.blended.iter().filter(|item| item.instance_count > 1) {
+            scene.sort_copies(gpu, item.draw, pose.draws[item.draw].world, eye);
+        }
+    }
+
+    /// The floor that the view asks for.
+    fn floor(&self, view: &View) -> Option<Floor> {
+        let scene = self.prepared.scene.as_ref().filter(|_| view.ground != Ground::default())?;
+        scene.scene.bounds.map(Floor::below)
+    }
+
     /// Poses the scene if it is not posed so already; at rest, and without animations, nothing is written.
     fn take_pose(&mut self, gpu: &Gpu, time: Option<AnimationTime>) {
         let (Some(scene), Some(pose)) = (&self.prepared.scene, &mut self.pose) else { return };

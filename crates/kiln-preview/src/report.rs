@@ -44,6 +44,8 @@ pub struct ApplyReport {
     pub made: Vec<String>,
     /// What these took to the device.
     pub uploaded: Uploaded,
+    /// Whether the environment's sun is a light of its own, which casts shadows.
+    pub has_sun: bool,
 }
 
 /// An animation to choose.

@@ -111,6 +111,25 @@ impl GpuScene {
         }
     }
 
+    /// Orders the copies of a draw from far to near, as blending wants them. `world` is where the draw is.
+    pub fn sort_copies(&self, gpu: &Gpu, index: usize, world: Mat4, eye: Vec3) {
+        let Some((draw, buffer)) = all_draws(&self.scene).nth(index).zip(self.instances[index].as_ref())
+        else {
+            return;
+        };
+        let middle = self.scene.primitives[draw.primitive].bounds;
+        let middle = (middle.min + middle.max) / 2.0;
+        let mut copies: Vec<(f32, Mat4)> = draw
+            .instances
+            .iter()
+            .map(kiln_scene::Instance::matrix)
+            .map(|copy| ((world * copy).transform_point3(middle).distance_squared(eye), copy))
+            .collect();
+        copies.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let matrices: Vec<Mat4> = copies.into_iter().map(|(_, matrix)| matrix).collect();
+        gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&matrices));
+    }
+
     /// The joints that a mesh's vertices hang on. Without a skin that is the first, whose matrix is neutral.
     pub fn influences(&self, gpu: &Gpu, mesh: usize) -> wgpu::Buffer {
         let Mesh { influences, vertex_count, .. } = &self.meshes[mesh];

@@ -116,6 +116,10 @@ pub(crate) enum Slot {
     LutSampler,
     /// The scene's own.
     Lights,
+    /// The environment's.
+    Sun,
+    SunShadow,
+    SunShadowSampler,
     Material,
     MaterialTexture(Map),
     MaterialSampler(Map),
@@ -135,7 +139,7 @@ pub(crate) enum Slot {
     OwnSampler,
 }
 
-const FIXED: [(Slot, &str); 19] = [
+const FIXED: [(Slot, &str); 22] = [
     (Slot::Frame, "frame"),
     (Slot::EnvSkybox, "env_skybox"),
     (Slot::EnvIrradiance, "env_irradiance"),
@@ -148,6 +152,9 @@ const FIXED: [(Slot, &str); 19] = [
     (Slot::EnvSampler, "env_sampler"),
     (Slot::LutSampler, "lut_sampler"),
     (Slot::Lights, "lights"),
+    (Slot::Sun, "sun"),
+    (Slot::SunShadow, "sun_shadow"),
+    (Slot::SunShadowSampler, "sun_shadow_sampler"),
     (Slot::Material, "material"),
     (Slot::Draw, "draw"),
     (Slot::JointMatrices, "joint_matrices"),
@@ -159,6 +166,8 @@ const FIXED: [(Slot, &str); 19] = [
 
 const MATRICES: &str = "read-only storage buffer of array<mat4x4f>";
 const FLOATS: &str = "read-only storage buffer of array<f32>";
+const DEPTH: &str = "texture_depth_2d";
+const COMPARISON: &str = "sampler_comparison";
 
 impl Slot {
     /// The slot of a shader variable's name.
@@ -197,6 +206,10 @@ impl Slot {
             (MATRICES, BindingKind::Storage { read_only: true, size_bytes: 64 })
             | (FLOATS, BindingKind::Storage { read_only: true, size_bytes: 4 }) => true,
             ("sampler", BindingKind::Sampler { comparison }) => !comparison,
+            (COMPARISON, BindingKind::Sampler { comparison }) => *comparison,
+            (DEPTH, BindingKind::Texture { dimension, sample, multisampled: false }) => {
+                dimension == "2d" && sample == "depth"
+            }
             (expected, BindingKind::Texture { dimension, sample, multisampled: false })
                 if sample == "float" =>
             {
@@ -215,7 +228,9 @@ impl Slot {
     /// What a shader must declare it as.
     pub fn expects(self) -> &'static str {
         match self {
-            Slot::Frame | Slot::Lights | Slot::Material | Slot::Draw | Slot::Params => "uniform",
+            Slot::Frame | Slot::Lights | Slot::Sun | Slot::Material | Slot::Draw | Slot::Params => "uniform",
+            Slot::SunShadow => DEPTH,
+            Slot::SunShadowSampler => COMPARISON,
             Slot::JointMatrices | Slot::Instances => MATRICES,
             Slot::MorphDeltas | Slot::MorphWeights => FLOATS,
             Slot::EnvSkybox | Slot::EnvIrradiance | Slot::EnvSpecular | Slot::EnvSheen => "texture_cube<f32>",

@@ -6,6 +6,7 @@ use kiln_shader::Member;
 
 use crate::parameter::{OfferedParameter, ParameterValues};
 use crate::slot::Map;
+use crate::sun::SunValues;
 
 /// A value that a uniform member can take.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,6 +68,8 @@ pub(crate) struct FrameValues {
     pub background_blur: f32,
     pub viewport_size: [f32; 2],
     pub time_s: f32,
+    /// For the uniform `sun`.
+    pub sun: SunValues,
 }
 
 impl FrameValues {

@@ -1,5 +1,7 @@
 //! What the user sets: which scene under which light, seen how.
 
+use std::str::FromStr;
+
 use crate::camera::OrbitCamera;
 use crate::parameter::ParameterValues;
 
@@ -43,6 +45,71 @@ impl Selection {
     }
 }
 
+/// What is to be seen behind the scene. What shines through glass is the environment in any case.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Background {
+    /// The environment, as blurred as [`View::background_blur`] says.
+    #[default]
+    Environment,
+    /// One colour, linear Rec. 709: exposure leaves it as it is, the tone mapper does not.
+    Color([f32; 3]),
+    /// Squares of two greys, by which one sees what is transparent.
+    Checker,
+}
+
+impl FromStr for Background {
+    type Err = String;
+
+    /// `environment`, `checker`, or a colour as `#rrggbb`, sRGB-encoded.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let color = || {
+            let digits = text
+                .strip_prefix('#')
+                .filter(|digits| digits.len() == 6 && digits.bytes().all(|it| it.is_ascii_hexdigit()))?;
+            let number = u32::from_str_radix(digits, 16).ok()?;
+            Some(number.to_be_bytes())
+        };
+        match text {
+            "environment" => Ok(Background::Environment),
+            "checker" => Ok(Background::Checker),
+            _ => color().map(|[_, rgb @ ..]| Background::Color(rgb.map(from_srgb))).ok_or_else(|| {
+                format!("`{text}` is no background: environment, checker or a colour as #rrggbb")
+            }),
+        }
+    }
+}
+
+/// The linear value of an sRGB-encoded one. IEC 61966-2-1.
+pub(crate) fn from_srgb(value: u8) -> f32 {
+    let value = f32::from(value) / 255.0;
+    if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
+}
+
+/// What is drawn on the floor, which is at the lowest point of the scene at rest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Ground {
+    /// Lines, each tenth one stronger: 1 m and 10 m apart under things of some metres, else a power of ten as far.
+    pub has_grid: bool,
+    /// Darkens by the sun's shadow what lies behind. Without a sun that is a light of its own there is none.
+    pub catches_shadow: bool,
+}
+
+impl FromStr for Ground {
+    type Err = String;
+
+    /// `none`, `grid`, `shadow` or `grid+shadow`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (has_grid, catches_shadow) = match text {
+            "none" => (false, false),
+            "grid" => (true, false),
+            "shadow" => (false, true),
+            "grid+shadow" | "shadow+grid" => (true, true),
+            _ => return Err(format!("`{text}` is no ground: none, grid, shadow or grid+shadow")),
+        };
+        Ok(Ground { has_grid, catches_shadow })
+    }
+}
+
 /// How the selected scene is shown. None of it needs a rebuild.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
@@ -64,6 +131,10 @@ pub struct View {
     pub time_s: f32,
     /// The parameters that shaders' authors offer.
     pub parameters: ParameterValues,
+    /// What is behind the scene.
+    pub background: Background,
+    /// What is below it.
+    pub ground: Ground,
 }
 
 impl Default for View {
@@ -79,6 +150,8 @@ impl Default for View {
             animation: None,
             time_s: 0.0,
             parameters: ParameterValues::default(),
+            background: Background::Environment,
+            ground: Ground::default(),
         }
     }
 }

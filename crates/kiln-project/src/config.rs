@@ -344,10 +344,15 @@ fn read_effects(section: &mut Section) -> EffectOverrides {
         section.fail(message, section.place("forbid"), None);
         overrides.force.clear();
     }
-    for effect in overrides.force.iter().filter(|effect| effect.is_of_geometry()) {
-        let message =
-            format!("`{0}` cannot be forced: no setting gives a mesh what `{0}` reads", effect.name());
-        let help = "take it out of `force`; draws whose scene moves or repeats them have it already";
+    for effect in overrides.force.iter().filter(|effect| !effect.is_of_material()) {
+        let (message, help) = if effect.is_of_geometry() {
+            let message =
+                format!("`{0}` cannot be forced: no setting gives a mesh what `{0}` reads", effect.name());
+            (message, "take it out of `force`; draws whose scene moves or repeats them have it already")
+        } else {
+            let message = format!("`{}` cannot be forced: it is the environment's", effect.name());
+            (message, "`sun = \"extract\"` of an [env] makes its sun a light")
+        };
         section.warn(message, section.place("force"), help);
     }
     overrides

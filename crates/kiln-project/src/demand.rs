@@ -21,7 +21,7 @@ pub struct SceneDemand {
     pub env: String,
     /// The shader that draws it.
     pub shader: String,
-    /// Its materials, after `[effects]`.
+    /// Its materials in the light of `env`, after `[effects]`.
     pub materials: Vec<MaterialEffects>,
     /// Whether they are known: a scene that could never be read may need anything.
     pub is_known: bool,

@@ -167,7 +167,9 @@ pub(crate) fn plan_project(
     let mut planner = Planner { diagnostics, ..Planner::default() };
     let mut variants = shader::Variants::default();
     let mut scenes = Vec::new();
-    for (name, config) in &project.scenes {
+    // With errors there may be scenes that could not be read.
+    let shapes = if has_errors(&planner.diagnostics) { BTreeMap::new() } else { scene::shapes(&project) };
+    for (name, config) in project.scenes.iter().chain(&shapes) {
         scenes.push(scene::plan_scene(&mut planner, engine, &project, name, config, &mut variants)?);
     }
     let envs = env_demands(&project, &scenes);
@@ -192,7 +194,7 @@ pub(crate) fn plan_project(
     }
     let mut meta = json!({
         "name": project.name,
-        "scenes": project.scenes.keys().collect::<Vec<_>>(),
+        "scenes": project.scenes.keys().chain(shapes.keys()).collect::<Vec<_>>(),
         "envs": project.envs.keys().collect::<Vec<_>>(),
     });
     let unread = unread_targets(&envs, &planner.targets);

@@ -6,7 +6,10 @@ use std::sync::Arc;
 
 use kiln_build::{Action, ActionOutput, Engine, Error, Input, Tracker, little_memory};
 use kiln_diagnostic::{Diagnostic, has_errors};
-use kiln_scene::{MaterialEffects, PackOptions, Packed, pack_with, variant_name};
+use kiln_scene::{
+    BUILT_IN, EffectSet, MaterialEffects, PackOptions, Packed, SpecularGlossinessAs, built_in, pack_with,
+    variant_name,
+};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
@@ -15,7 +18,7 @@ use crate::demand::overridden;
 use crate::environment::{command, failure};
 use crate::plan::{PartSpec, Planner, no_content, rank, unreadable};
 use crate::shader::Variants;
-use crate::{Project, SceneConfig, SceneDemand};
+use crate::{Project, Role, SceneConfig, SceneDemand};
 
 /// What a scan of a scene tells the planner.
 #[derive(Default, Serialize, Deserialize)]
@@ -26,6 +29,34 @@ struct SceneScan {
 
 /// Version of the code behind both the scan and the action.
 const PACK_RECIPE: u32 = 8;
+
+/// What the source of a scene begins with that is one of [`BUILT_IN`].
+const SHAPE: &str = "shape:";
+
+/// What is shown of a project without scenes: every built-in shape in its first environment. What they call for decides nothing
+/// of that environment, which is baked as if nothing were known of what it lights.
+pub(crate) fn shapes(project: &Project) -> BTreeMap<String, SceneConfig> {
+    let is_material = |name: &&String| project.shaders[*name].role == Role::Material;
+    let pbr = "pbr".to_owned();
+    let shader = project.shaders.keys().find(|name| **name == pbr).filter(is_material);
+    let shader = shader.or_else(|| project.shaders.keys().find(is_material));
+    let (Some(shader), Some(env), true) = (shader, project.envs.keys().next(), project.scenes.is_empty())
+    else {
+        return BTreeMap::new();
+    };
+    let scene = |name: &&str| SceneConfig {
+        source: format!("{SHAPE}{name}"),
+        env: env.clone(),
+        shader: shader.clone(),
+        specular_glossiness: SpecularGlossinessAs::default(),
+    };
+    BUILT_IN.iter().map(|name| ((*name).to_owned(), scene(name))).collect()
+}
+
+/// The file of a built-in shape.
+fn shape(source: &str) -> Option<Arc<[u8]>> {
+    built_in(source.strip_prefix(SHAPE)?).map(Arc::from)
+}
 
 /// Adds the actions and targets of one scene and notes the shader variants that it calls for.
 pub(crate) fn plan_scene(
@@ -53,12 +84,9 @@ pub(crate) fn plan_scene(
     // While a scene cannot be read, what it last called for stays.
     let materials = found.materials.filter(|_| astray.is_empty()).or_else(|| last_materials(engine, name));
     let is_known = materials.is_some();
-    let materials: Vec<MaterialEffects> =
+    let mut materials: Vec<MaterialEffects> =
         materials.iter().flatten().map(|material| overridden(&project.effects, material)).collect();
-    for material in &materials {
-        let features = material.effects.iter().map(|effect| effect.name().to_owned());
-        variants.ask(&config.shader, features.collect());
-    }
+    ask_variants(&mut materials, project, config, variants);
     let inputs =
         scan.looked_at.iter().map(|(path, digest)| Input::Source { path: path.clone(), digest: *digest });
     let (source, files) = (config.source.clone(), scan.clone());
@@ -86,7 +114,7 @@ pub(crate) fn plan_scene(
                 return Ok(ActionOutput { diagnostics, ..ActionOutput::default() });
             }
             let mut read = |path: &str| contents.get(path).cloned().flatten();
-            Ok(match read(&source) {
+            Ok(match shape(&source).or_else(|| read(&source)) {
                 Some(bytes) => pack_scene(pack_with(&options, &source, &bytes, &mut read)),
                 None => failure(no_content("scene", unreadable.as_deref())),
             })
@@ -100,6 +128,30 @@ pub(crate) fn plan_scene(
     Ok(SceneDemand { name: name.to_owned(), env, shader, materials, is_known })
 }
 
+/// Asks for the variants that the scene is drawn with in its own environment, which `materials` then have, and for those that it
+/// is drawn with if somebody looks at it in another one whose sun is a light.
+fn ask_variants(
+    materials: &mut [MaterialEffects],
+    project: &Project,
+    config: &SceneConfig,
+    variants: &mut Variants,
+) {
+    let mut ask = |effects: &EffectSet| {
+        variants.ask(&config.shader, effects.iter().map(|effect| effect.name().to_owned()).collect());
+    };
+    let has_sun = project.envs.get(&config.env).is_some_and(|env| env.is_sun_extracted);
+    let has_any_sun = project.envs.values().any(|env| env.is_sun_extracted);
+    for material in materials {
+        let in_sun = project.effects.under_sun(&material.effects);
+        if has_sun {
+            material.effects = in_sun;
+        } else if has_any_sun {
+            ask(&in_sun);
+        }
+        ask(&material.effects);
+    }
+}
+
 /// The materials of what was published last of a scene.
 fn last_materials(engine: &Engine, name: &str) -> Option<Vec<MaterialEffects>> {
     let published = engine.published();
@@ -111,7 +163,9 @@ fn last_materials(engine: &Engine, name: &str) -> Option<Vec<MaterialEffects>> {
 /// Reads the scene once to learn which files it consists of and which effects it calls for. What is wrong
 /// with it is said by the action, which reads the same files.
 fn scan_scene(options: &PackOptions, source: &str, tracker: &mut Tracker) -> (Value, Vec<Diagnostic>) {
-    let Some(bytes) = tracker.read(source) else { return (json!(SceneScan::default()), Vec::new()) };
+    let Some(bytes) = shape(source).or_else(|| tracker.read(source)) else {
+        return (json!(SceneScan::default()), Vec::new());
+    };
     let packed = pack_with(options, source, &bytes, &mut |path| tracker.read(path));
     let is_sound = packed.glb.is_some() && !has_errors(&packed.diagnostics);
     (json!(SceneScan { materials: is_sound.then_some(packed.effects) }), Vec::new())

@@ -38,6 +38,7 @@ pub(crate) const SHADERS: &[(&str, &str)] = &[
     ("shaders/pbr/punctual.wgsl", include_str!("../../../shaders/pbr/punctual.wgsl")),
     ("shaders/pbr/sheen.wgsl", include_str!("../../../shaders/pbr/sheen.wgsl")),
     ("shaders/pbr/specular.wgsl", include_str!("../../../shaders/pbr/specular.wgsl")),
+    ("shaders/pbr/sun.wgsl", include_str!("../../../shaders/pbr/sun.wgsl")),
     ("shaders/pbr/tonemap.wgsl", include_str!("../../../shaders/pbr/tonemap.wgsl")),
     ("shaders/pbr/transmission.wgsl", include_str!("../../../shaders/pbr/transmission.wgsl")),
     ("shaders/pbr/volume.wgsl", include_str!("../../../shaders/pbr/volume.wgsl")),

@@ -6,7 +6,7 @@ use crate::{Effect, EffectSet};
 
 impl Effect {
     /// Every effect, in the order of their names.
-    pub const ALL: [Effect; 20] = [
+    pub const ALL: [Effect; 21] = [
         Effect::AlphaBlend,
         Effect::AlphaMask,
         Effect::Anisotropy,
@@ -23,6 +23,7 @@ impl Effect {
         Effect::Sheen,
         Effect::Skin,
         Effect::Specular,
+        Effect::Sun,
         Effect::Transmission,
         Effect::Unlit,
         Effect::VertexColor,
@@ -48,6 +49,7 @@ impl Effect {
             Effect::Sheen => "sheen",
             Effect::Skin => "skin",
             Effect::Specular => "specular",
+            Effect::Sun => "sun",
             Effect::Transmission => "transmission",
             Effect::Unlit => "unlit",
             Effect::VertexColor => "vertex_color",
@@ -60,6 +62,11 @@ impl Effect {
         matches!(self, Effect::Instancing | Effect::Morph | Effect::Skin)
     }
 
+    /// Whether a material's values call for it, or the scene that holds it; not its vertices, and not the environment.
+    pub fn is_of_material(self) -> bool {
+        !self.is_of_geometry() && self != Effect::Sun
+    }
+
     /// The effect of that [`name`](Effect::name).
     pub fn from_name(name: &str) -> Option<Effect> {
         Effect::ALL.into_iter().find(|effect| effect.name() == name)
@@ -70,7 +77,7 @@ impl Effect {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct EffectOverrides {
-    /// Every material has these, but for [those of geometry](Effect::is_of_geometry): no setting gives a mesh joints.
+    /// Every material has these, as far as they are [materials'](Effect::is_of_material): no setting gives a mesh joints.
     pub force: EffectSet,
     /// No material has these.
     pub forbid: EffectSet,
@@ -79,8 +86,14 @@ pub struct EffectOverrides {
 impl EffectOverrides {
     /// The effects that a material is drawn with.
     pub fn apply(&self, effects: &EffectSet) -> EffectSet {
-        let forced = self.force.iter().filter(|effect| !effect.is_of_geometry());
+        let forced = self.force.iter().filter(|effect| effect.is_of_material());
         effects.iter().chain(forced).filter(|effect| !self.forbid.contains(effect)).copied().collect()
+    }
+
+    /// What [`apply`](Self::apply) made of a material, in the light of an environment whose sun is a light of its own.
+    pub fn under_sun(&self, effects: &EffectSet) -> EffectSet {
+        let is_lit = !effects.contains(&Effect::Unlit) && !self.forbid.contains(&Effect::Sun);
+        effects.iter().copied().chain(is_lit.then_some(Effect::Sun)).collect()
     }
 }
 

@@ -15,6 +15,7 @@
 //! Not here: files (a caller resolves URIs), GPU resources (`kiln-preview`), which lobes to bake (`kiln-project`).
 
 pub use animation::{Animation, Channel, Curve, Interpolation, Target};
+pub use built_in::{BUILT_IN, built_in};
 pub use deform::{Deformed, Influence, MorphDelta, MorphTarget, skinned_vertex};
 pub use effect::{EffectOverrides, variant_name};
 pub use error::SceneError;
@@ -30,6 +31,7 @@ pub use uri::{Uri, UriKind, external_uris};
 mod accessor;
 mod animate;
 mod animation;
+mod built_in;
 mod conform;
 mod container;
 mod deform;

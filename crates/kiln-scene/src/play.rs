@@ -239,14 +239,15 @@ fn set_node(node: &mut PosedNode, target: Target, value: &[f32]) {
     }
 }
 
-/// Sets what a [`Camera`] has; the aspect ratio is the window's, and orthographic sizes are not kept.
+/// Sets what a [`Camera`] has; the aspect ratio is the window's.
 fn set_camera(camera: &mut Camera, property: CameraProperty, value: f32) {
     use CameraProperty as C;
     match property {
         C::Yfov => camera.yfov_rad = Some(value),
         C::Znear | C::OrthographicZnear => camera.znear = value,
         C::Zfar | C::OrthographicZfar => camera.zfar = Some(value),
-        C::AspectRatio | C::Xmag | C::Ymag => {}
+        C::Ymag => camera.ymag = Some(value),
+        C::AspectRatio | C::Xmag => {}
     }
 }
 

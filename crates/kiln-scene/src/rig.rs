@@ -21,16 +21,16 @@ pub(crate) fn camera(
     let source = root.cameras.get(index).ok_or_else(missing)?;
     let name = root.nodes[node].name.clone().or_else(|| source.name.clone());
     let name = name.unwrap_or_else(|| format!("camera {index}"));
-    let (yfov_rad, znear, zfar) = match (&source.perspective, &source.orthographic) {
-        (Some(it), _) if source.kind == "perspective" => (Some(it.yfov), it.znear, it.zfar),
-        (_, Some(it)) if source.kind == "orthographic" => (None, it.znear, Some(it.zfar)),
+    let (yfov_rad, znear, zfar, ymag) = match (&source.perspective, &source.orthographic) {
+        (Some(it), _) if source.kind == "perspective" => (Some(it.yfov), it.znear, it.zfar, None),
+        (_, Some(it)) if source.kind == "orthographic" => (None, it.znear, Some(it.zfar), Some(it.ymag)),
         _ => {
             let reason = format!("`{}` is no type of camera or lacks its properties", source.kind);
             return Err(SceneError::new(format!("/cameras/{index}"), reason));
         }
     };
     let source = schema::Camera { name: Some(name.clone()), ..source.clone() };
-    Ok((Camera { name, world: world.as_mat4(), yfov_rad, znear, zfar }, source))
+    Ok((Camera { name, world: world.as_mat4(), yfov_rad, znear, zfar, ymag }, source))
 }
 
 /// A node's light (`KHR_lights_punctual`) in world space, and its properties.

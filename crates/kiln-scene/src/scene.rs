@@ -273,6 +273,8 @@ pub enum Effect {
     Skin,
     /// `KHR_materials_specular`/`ior` away from their defaults.
     Specular,
+    /// The environment's extracted sun shines on it: called for by what lights a scene, never by the scene.
+    Sun,
     /// Light passes through the surface.
     Transmission,
     /// Base colour alone, no lighting.
@@ -443,6 +445,8 @@ pub struct Camera {
     pub znear: f32,
     /// Far plane; `None` = infinite.
     pub zfar: Option<f32>,
+    /// Half of the height that an orthographic camera sees; `None` for perspective cameras.
+    pub ymag: Option<f32>,
 }
 
 /// A light of `KHR_lights_punctual`, in world space.

@@ -2,6 +2,7 @@
 
 mod animation;
 mod build;
+mod built_in;
 mod conform;
 mod corpus;
 mod deforming;

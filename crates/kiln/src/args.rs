@@ -482,6 +482,12 @@ pub(crate) struct RenderArgs {
     /// Exposure in stops
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     pub(crate) exposure: f32,
+    /// What is behind the scene: environment, checker, or a colour as #rrggbb (sRGB; exposure leaves it, the tone mapper does not)
+    #[arg(long, default_value = "environment", value_name = "WHAT")]
+    pub(crate) background: kiln_preview::Background,
+    /// What is below the scene: none, grid, shadow (that of the extracted sun) or grid+shadow
+    #[arg(long, default_value = "none", value_name = "WHAT")]
+    pub(crate) ground: kiln_preview::Ground,
     /// Set a parameter that a shader's author offers: wetness=0.5, tonemap.tint=1,0.9,0.8, tone_mapper=agx
     #[arg(long, value_name = "[SHADER.]NAME=VALUE")]
     pub(crate) param: Vec<kiln_preview::Assignment>,

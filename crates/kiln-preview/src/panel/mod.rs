@@ -13,6 +13,7 @@ mod diagnostics;
 mod parameters;
 mod scene;
 mod side;
+mod surroundings;
 mod timeline;
 mod top;
 

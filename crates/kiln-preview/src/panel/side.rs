@@ -25,6 +25,8 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState) {
         }
         show_light(ui, &mut state.view);
         show_diffuse(ui, &mut state.selection.diffuse);
+        section(ui, "Background and ground");
+        super::surroundings::show(ui, state);
         super::parameters::show(ui, &state.report.parameters, &mut state.view.parameters);
         section(ui, "Camera");
         super::scene::show_cameras(ui, state);

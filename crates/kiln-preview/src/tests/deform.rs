@@ -21,8 +21,16 @@ fn viewer(glb: &[u8]) -> Option<HeadlessViewer> {
 }
 
 fn viewer_on(gpu: Gpu, glb: &[u8]) -> HeadlessViewer {
+    viewer_in(gpu, glb, None)
+}
+
+/// With a sun of this direction, if there is one.
+fn viewer_in(gpu: Gpu, glb: &[u8], sun: Option<[f64; 3]>) -> HeadlessViewer {
     let mut build = Build::new();
     build.shaders_of(glb).lut().env("sky", SIX_COLORS).scene("scene", "sky", glb.to_vec());
+    if let Some(sun) = sun {
+        build.sunlit_shaders_of(glb).sun("sky", sun, [3.0; 3], 0.01);
+    }
     let mut viewer = HeadlessViewer::new(gpu, SIZE);
     let report = viewer.apply(&build.revision());
     assert_eq!(report.diagnostics, vec![]);
@@ -294,6 +302,54 @@ fn bar_that_is_morphed_skinned_and_copied_is_its_baked_self() {
     let effects: Vec<_> = scene.draws.iter().map(|draw| draw.effects().len()).collect();
     assert_eq!(effects, [2, 1], "one draw is skinned and morphed, the other copied");
     check("bar", &pack, &[None, Some(0.7), Some(2.0), None]);
+}
+
+#[test]
+fn copies_that_are_blended_are_drawn_from_far_to_near() {
+    let blended = json!({
+        "pbrMetallicRoughness": { "baseColorFactor": [1, 1, 1, 0.5], "roughnessFactor": 0.1 },
+        "alphaMode": "BLEND",
+    });
+    let pack = packed(&bar(blended));
+    let (Some(mut copied), Some(mut apart)) = (viewer(&pack), viewer(&baked(&pack, None))) else { return };
+    // From both ends of the row: in the file's order one of them has the nearer copy first.
+    for yaw_rad in [1.3, -1.8] {
+        let bounds = kiln_scene::load(&pack).expect("it loads").bounds.expect("there is something");
+        let camera = OrbitCamera { yaw_rad, ..OrbitCamera::framing(bounds, 1.0) };
+        (copied.view.camera, apart.view.camera) = (Some(camera), Some(camera));
+        let (frame, expected) = (picture(&mut copied, None), picture(&mut apart, None));
+        keep(&frame, &format!("blended-copies-{yaw_rad}"));
+        let share = share_that_differs(&frame, &expected);
+        assert!(share <= EDGE_SHARE, "from {yaw_rad}: {share}");
+    }
+}
+
+#[test]
+fn shadows_of_what_is_morphed_skinned_and_copied_are_those_of_its_baked_self() {
+    /// Bounds of what moves are wider than those of its pose, so the map's texels, and shadows' edges with them, are others.
+    const SHADOW_EDGE_SHARE: f64 = 0.01;
+    let Some(gpu) = gpu() else { return };
+    let sun = Some([-0.75, 0.5, 0.43]);
+    let pack = packed(&bar(json!({ "pbrMetallicRoughness": { "metallicFactor": 0.0 } })));
+    let bounds = kiln_scene::load(&pack).expect("what was packed loads").bounds.expect("there is something");
+    let camera = Some(OrbitCamera::framing(bounds, SIZE[0] as f32 / SIZE[1] as f32));
+    let mut posed = viewer_in(gpu.clone(), &pack, sun);
+    posed.view.camera = camera;
+    for time_s in [None, Some(0.7), Some(2.0)] {
+        let frame = picture(&mut posed, time_s);
+        keep(&frame, &format!("bar-in-the-sun-{}", time_s.unwrap_or(0.0)));
+        let mut still = viewer_in(gpu.clone(), &baked(&pack, time_s), sun);
+        still.view.camera = camera;
+        let share = share_that_differs(&frame, &picture(&mut still, None));
+        assert!(share <= SHADOW_EDGE_SHARE, "at {time_s:?}: {share}");
+        if time_s.is_some() {
+            // The other shadow, on what stands where it is now.
+            let mut rest = viewer_in(gpu.clone(), &baked(&pack, time_s), Some([-0.5, 0.75, 0.43]));
+            rest.view.camera = camera;
+            let share = share_that_differs(&frame, &picture(&mut rest, None));
+            assert!(share > 2.0 * SHADOW_EDGE_SHARE, "the check sees another sun: {share}");
+        }
+    }
 }
 
 /// Adds an accessor; its index.

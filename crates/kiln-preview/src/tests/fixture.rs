@@ -8,6 +8,7 @@ use half::f16;
 use kiln_build::Digest;
 use kiln_gpu::{Gpu, GpuError};
 use kiln_link::{Part, Revision, RevisionTable, Target, TargetState};
+use kiln_scene::{EffectOverrides, EffectSet};
 use serde_json::{Value, json};
 
 /// Six radiances in KTX2 face order: +X red, −X cyan, +Y green, −Y magenta, +Z blue, −Z yellow.
@@ -143,6 +144,15 @@ impl Build {
         self.target(name, "cube", meta, &parts)
     }
 
+    /// A cube of one level with a radiance for each texel, faces in KTX2 order and rows from the top.
+    pub fn cube_of(&mut self, name: &str, size: u32, texels: &[[f32; 3]]) -> &mut Self {
+        let texel =
+            |[r, g, b]: &[f32; 3]| [*r, *g, *b, 1.0].map(f16::from_f32).map(f16::to_le_bytes).concat();
+        let bytes = texels.iter().flat_map(texel).collect();
+        let meta = json!({ "size": size, "levels": 1, "format": "rgba16f", "scale_log2": 0 });
+        self.target(name, "cube", meta, &[("mip0", bytes)])
+    }
+
     /// Lazarov's fit of the split-sum table: smooth, plausible, and not constant.
     pub fn lut(&mut self) -> &mut Self {
         let texel =
@@ -166,11 +176,27 @@ impl Build {
 
     /// The shader variants that a scene's draws call for, in all its material variants.
     pub fn shaders_of(&mut self, glb: &[u8]) -> &mut Self {
+        self.variants_of(glb, |effects| effects)
+    }
+
+    /// The same in the light of a sun.
+    pub fn sunlit_shaders_of(&mut self, glb: &[u8]) -> &mut Self {
+        self.variants_of(glb, |effects| EffectOverrides::default().under_sun(&effects))
+    }
+
+    /// The sun of an environment, with what was extracted of it.
+    pub fn sun(&mut self, env: &str, direction: [f64; 3], irradiance: [f64; 3], diameter: f64) -> &mut Self {
+        let light = json!({ "direction": direction, "irradiance": irradiance, "angular_diameter": diameter });
+        let json = json!({ "light": light }).to_string().into_bytes();
+        self.target(&format!("env/{env}/sun"), "light", json!({}), &[("json", json)])
+    }
+
+    fn variants_of(&mut self, glb: &[u8], lit: fn(EffectSet) -> EffectSet) -> &mut Self {
         let scene = kiln_scene::load(glb).expect("what was packed loads");
         let variants = std::iter::once(None).chain((0..scene.variants.len()).map(Some));
         for variant in variants {
             for draw in scene.draws.iter().chain(&scene.hidden) {
-                let effects = scene.effects(draw, scene.material_of(draw, variant));
+                let effects = lit(scene.effects(draw, scene.material_of(draw, variant)));
                 let mut features: Vec<&str> = effects.iter().map(|effect| effect.name()).collect();
                 features.sort_unstable();
                 self.shaders(&[&features]);

@@ -2,7 +2,6 @@
 
 use std::f32::consts::FRAC_PI_2;
 
-use glam::Vec3;
 use image::{Rgb, RgbaImage};
 use serde_json::json;
 
@@ -11,7 +10,7 @@ use crate::{HeadlessViewer, OrbitCamera};
 
 /// Straight from the front, far enough for a sphere of radius 1 to fill half the height.
 pub(super) const FRONT: OrbitCamera =
-    OrbitCamera { target: Vec3::ZERO, distance: 4.0, yaw_rad: 0.0, pitch_rad: 0.0, field_of_view_rad: 0.9 };
+    OrbitCamera { distance: 4.0, field_of_view_rad: 0.9, ..OrbitCamera::BACKGROUND_ONLY };
 
 /// Two steps of 255: rounding of f16 maps, of the f16 picture, and of the output.
 pub(super) const STEPS_MAX: u8 = 2;

@@ -1,5 +1,6 @@
 //! What the preview promises, on whatever adapter there is (lavapipe in CI).
 
+mod behind;
 mod corpus;
 mod deform;
 mod effects;
@@ -11,6 +12,7 @@ mod lights;
 mod panels;
 mod parameters;
 mod pure;
+mod sun;
 mod swap;
 mod transmission;
 mod twin;

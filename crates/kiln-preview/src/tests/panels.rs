@@ -8,7 +8,7 @@ use kiln_shader::Widget;
 
 use crate::panel::{self, Connection, PanelState};
 use crate::theme;
-use crate::{AnimationTime, OfferedAnimation, OfferedParameter, Selection, View};
+use crate::{AnimationTime, Background, Ground, OfferedAnimation, OfferedParameter, Selection, View};
 
 fn state() -> PanelState {
     let mut state = PanelState::new("llvmpipe, Vulkan".to_owned(), Selection::default(), View::default());
@@ -241,4 +241,26 @@ fn variants_and_cameras_are_chosen_and_belong_to_their_scene() {
     harness.get_by_label("car").click();
     harness.run_steps(4);
     assert_eq!((harness.state().selection.variant.as_deref(), harness.state().view.scene_camera), (None, 0));
+}
+
+#[test]
+fn background_and_ground_are_chosen_in_the_panel() {
+    let mut harness = harness(state());
+    assert!(harness.query_by_label("background colour").is_none(), "the environment has no colour");
+    harness.get_by_label("background").click();
+    harness.run_steps(4);
+    harness.get_by_label("Colour").click();
+    harness.run_steps(4);
+    assert!(matches!(harness.state().view.background, Background::Color(_)));
+    assert!(harness.query_by_label("background colour").is_some());
+    harness.get_by_label("Grid").click();
+    harness.get_by_label("Shadow on the ground").click();
+    harness.run_steps(4);
+    assert_eq!(harness.state().view.ground, Ground { has_grid: true, catches_shadow: true });
+    let why =
+        |harness: &Harness<'_, PanelState>| harness.query_by_label_contains("sun is no light").is_some();
+    assert!(why(&harness), "a ground that shows no shadow says why");
+    harness.state_mut().report.has_sun = true;
+    harness.run_steps(2);
+    assert!(!why(&harness));
 }

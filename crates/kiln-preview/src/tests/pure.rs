@@ -148,13 +148,40 @@ fn camera_of_the_file_is_where_the_file_puts_it() {
     let world = Mat4::from_translation(Vec3::new(1.0, 2.0, 6.0))
         * Mat4::from_rotation_y(0.3)
         * Mat4::from_rotation_x(-0.2);
-    let camera =
-        kiln_scene::Camera { name: String::new(), world, yfov_rad: Some(0.7), znear: 0.1, zfar: None };
+    let camera = kiln_scene::Camera {
+        name: String::new(),
+        world,
+        yfov_rad: Some(0.7),
+        znear: 0.1,
+        zfar: None,
+        ymag: None,
+    };
     let bounds = Some(Bounds { min: -Vec3::ONE, max: Vec3::ONE });
     let orbit = OrbitCamera::for_scene(bounds, &[camera], 0, 1.0);
     let forward = (orbit.target - orbit.position()).normalize();
     assert!((orbit.position() - Vec3::new(1.0, 2.0, 6.0)).length() <= 1e-4, "{orbit:?}");
     assert!((forward + world.z_axis.truncate()).length() <= 1e-4, "{orbit:?}");
+}
+
+#[test]
+fn camera_of_the_file_keeps_its_roll_its_size_and_the_way_straight_down() {
+    let bounds = Some(Bounds { min: -Vec3::ONE, max: Vec3::ONE });
+    let down = Mat4::from_rotation_x(-std::f32::consts::FRAC_PI_2);
+    for (turn, roll) in [(Mat4::from_rotation_y(0.3), 0.4), (down, 0.0), (down, 1.1), (Mat4::IDENTITY, -2.0)]
+    {
+        let world = turn * Mat4::from_rotation_z(roll) * Mat4::from_translation(Vec3::new(0.0, 0.0, 7.0));
+        for (yfov_rad, ymag) in [(Some(0.7), None), (None, Some(1.5))] {
+            let camera =
+                kiln_scene::Camera { name: String::new(), world, yfov_rad, znear: 0.1, zfar: None, ymag };
+            let orbit = OrbitCamera::for_scene(bounds, &[camera], 0, 1.0);
+            let clip = orbit.clip_from_world(bounds, 1.0);
+            // Half way up the picture at the target, seen from the file's camera.
+            let half = ymag.unwrap_or_else(|| 7.0 * 0.35_f32.tan());
+            let up = clip.project_point3(world.y_axis.truncate() * half * 0.5);
+            assert!((up.x.abs() <= 1e-4) && (up.y - 0.5).abs() <= 1e-4, "{up} with {orbit:?}");
+            assert_eq!(orbit.is_orthographic, ymag.is_some());
+        }
+    }
 }
 
 #[test]

@@ -169,3 +169,47 @@ fn each_environment_is_baked_for_the_union_of_its_own_scenes() {
     assert_eq!(of_hall(&joined), of_hall(&apart));
     assert!(!ran(&joined).iter().any(|action| action.contains("hall")), "{:?}", ran(&joined));
 }
+
+/// Names of the material shader's variants.
+fn variants(built: &Built) -> Vec<&str> {
+    built.targets.keys().filter_map(|name| name.strip_prefix("shader/flat/")).collect()
+}
+
+#[test]
+fn extracted_sun_calls_for_the_variant_that_it_lights_and_elsewhere_for_one_more() {
+    let without = place_of(&rough(0.9));
+    assert_eq!(variants(&without.build()), ["base"]);
+    let own = place_of(&rough(0.9));
+    own.edit("kiln.toml", "size = 32\n", "size = 32\nsun = \"extract\"\n");
+    let built = own.build();
+    assert_eq!(variants(&built), ["sun"]);
+    assert!(built.plan.scenes[0].materials[0].effects.contains(&Effect::Sun));
+    // Somebody may look at the scene in the light of an environment that it does not name.
+    let other = place_of(&rough(0.9));
+    other.edit(
+        "kiln.toml",
+        "[env.room]",
+        "[env.yard]\nsource = \"room.hdr\"\nsize = 8\nsun = \"extract\"\n[env.room]",
+    );
+    assert_eq!(variants(&other.build()), ["base", "sun"]);
+    let forbidden = place_of(&rough(0.9));
+    forbidden.edit("kiln.toml", "size = 32\n", "size = 32\nsun = \"extract\"\n");
+    forbidden.edit("kiln.toml", "[env.room]", "[effects]\nforbid = [\"sun\"]\n[env.room]");
+    assert_eq!(variants(&forbidden.build()), ["base"]);
+}
+
+#[test]
+fn project_without_scenes_shows_built_in_shapes_and_bakes_its_environment_whole() {
+    let place = place_of(&rough(0.9));
+    place.edit("kiln.toml", "[scene.quad]\nsource = \"quad.gltf\"\nenv = \"room\"\nshader = \"flat\"\n", "");
+    let built = place.build();
+    assert!(errors(&built).is_empty(), "{:?}", built.diagnostics);
+    let shapes: Vec<&str> = built.targets.keys().filter_map(|name| name.strip_prefix("scene/")).collect();
+    assert_eq!(shapes, ["cloth", "knob", "plane", "sphere"]);
+    assert_eq!(variants(&built), ["base"]);
+    assert_eq!(levels(&built, "env/room/specular"), ["mip0", "mip1", "mip2", "mip3"]);
+    assert_eq!(built.targets["project"].meta["scenes"], serde_json::json!(shapes));
+    let named = place_of(&rough(0.9));
+    named.edit("kiln.toml", "source = \"quad.gltf\"", "source = \"shape:knob\"");
+    assert!(names(&named.build()).contains(&"scene/quad"), "a scene may name a shape");
+}

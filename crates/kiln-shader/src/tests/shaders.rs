@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::{Files, compiled, set};
 use crate::{BindingKind, Compiled, Program, Reflection, scan};
 
-pub(super) const FEATURES: [&str; 20] = [
+pub(super) const FEATURES: [&str; 21] = [
     "alpha_blend",
     "alpha_mask",
     "anisotropy",
@@ -22,6 +22,7 @@ pub(super) const FEATURES: [&str; 20] = [
     "sheen",
     "skin",
     "specular",
+    "sun",
     "transmission",
     "unlit",
     "vertex_color",
@@ -29,7 +30,7 @@ pub(super) const FEATURES: [&str; 20] = [
 ];
 
 /// Names of the interface that belong to one feature, by what they start with.
-const OWNED: [(&str, &str); 30] = [
+const OWNED: [(&str, &str); 31] = [
     ("alpha_mask", "alpha_cutoff"),
     ("anisotropy", "anisotropy_"),
     ("clearcoat", "clearcoat_"),
@@ -53,6 +54,7 @@ const OWNED: [(&str, &str); 30] = [
     ("skin", "weights"),
     ("specular", "specular_factor"),
     ("specular", "specular_color_"),
+    ("sun", "sun"),
     ("transmission", "scene_color"),
     ("transmission", "transmission_"),
     ("volume", "attenuation_color"),

@@ -195,6 +195,7 @@ pub(crate) fn passes(plan: &Plan) -> Vec<Pass> {
         pass("picture of what stands behind glass", "no material transmits light", &glass),
         pass("pass blended, sorted by depth", "no material is transparent", &has(Effect::AlphaBlend)),
         pass("light loops", "no lit scene has lights of its own", &has(Effect::PunctualLights)),
+        pass("shadow map of the sun", "no scene is lit by an extracted sun", &has(Effect::Sun)),
         pass("tangents", "no material bends normals or is brushed", &|effects| {
             bends.iter().any(|effect| effects.contains(effect))
         }),

@@ -110,6 +110,7 @@ impl<'a> Session<'a> {
         std::fs::create_dir_all(&args.out)
             .with_context(|| format!("making the folder {}", args.out.display()))?;
         viewer.view.exposure_ev = args.exposure;
+        (viewer.view.background, viewer.view.ground) = (args.background, args.ground);
         let offered = viewer.apply(revision);
         let diagnostics = revision.table.diagnostics.clone();
         Ok(Session { args, viewer, offered, drawn: vec![], shots: vec![], notes: vec![], diagnostics })
@@ -129,6 +130,13 @@ impl<'a> Session<'a> {
             applied.notes.iter().filter(|note| !self.notes.contains(note)).cloned().collect::<Vec<_>>(),
         );
         self.diagnostics.extend(applied.diagnostics.iter().cloned());
+        if self.args.ground.catches_shadow && !applied.has_sun {
+            let env = applied.shown.env.as_deref().unwrap_or_default();
+            let note = format!("the ground shows no shadow: env/{env} has no sun that is a light of its own");
+            if !self.notes.contains(&note) {
+                self.notes.push(note);
+            }
+        }
         if let Some(name) = self.args.material_variant.as_ref().filter(|_| applied.shown.variant.is_none()) {
             return Err(unknown("material variant", name, &applied.variants));
         }
