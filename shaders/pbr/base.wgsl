@@ -7,6 +7,7 @@ import lib::vector::max_component;
 @if(anisotropy && (punctual_lights || sun)) import super::anisotropy::Brush;
 @if(diffuse_transmission) import super::diffuse_transmission::Scattering;
 @if(transmission && dispersion) import super::dispersion::dispersed_radiance;
+@if(inspect) import super::inspect::seen;
 @if(iridescence) import super::iridescence::{Film, iridescent_f0};
 @if(transmission && !dispersion) import super::transmission::transmitted_radiance;
 @if(transmission) import super::transmission::Entry;
@@ -88,6 +89,13 @@ fn base_radiance(base: Base) -> vec3f {
         @if(volume) let through = behind * base.transmittance;
         @else let through = behind;
         diffuse = mix(diffuse, below * through, base.transmission);
+    }
+    @if(inspect) {
+        seen.lobes.specular = specular + albedo.multiple * irradiance;
+        seen.lobes.diffuse = below * irradiance;
+        @if(diffuse_transmission) seen.lobes.diffuse *= 1.0 - base.scattering.share;
+        @if(transmission) seen.lobes.diffuse *= 1.0 - base.transmission;
+        seen.lobes.transmission = diffuse - seen.lobes.diffuse;
     }
     return specular + albedo.multiple * irradiance + diffuse;
 }

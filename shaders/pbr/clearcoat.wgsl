@@ -4,6 +4,7 @@ import lib::environment::{dominant_direction, ggx_scale_bias, specular_radiance}
 import lib::material::{mapped_normal, TangentFrame, texture_coordinate};
 @if(occlusion) import lib::material::specular_occlusion;
 import super::base::filtered_roughness;
+@if(inspect) import super::inspect::{cover, seen};
 import super::interface::{material, Varying};
 
 @group(1) @binding(11) var clearcoat_texture: texture_2d<f32>;
@@ -41,5 +42,9 @@ fn under_coat(below: vec3f, coat: Coat, view: vec3f, occlusion: f32) -> vec3f {
     let direction = dominant_direction(coat.normal, reflect(-view, coat.normal), roughness);
     var radiance = albedo * specular_radiance(direction, roughness);
     @if(occlusion) radiance *= specular_occlusion(n_dot_v, occlusion, roughness * roughness);
+    @if(inspect) {
+        cover(1.0 - albedo);
+        seen.lobes.clearcoat = radiance;
+    }
     return below * (1.0 - albedo) + radiance;
 }

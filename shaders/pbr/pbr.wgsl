@@ -4,16 +4,19 @@
 
 import lib::colour::within_f16;
 import lib::frame::frame;
+@if(inspect) import lib::inspect::mip_level;
 import lib::material::texture_coordinate;
 @if(normal_map && !unlit) import lib::material::{mapped_normal, TangentFrame};
 import lib::vector::normalize_or;
 @if(anisotropy && !unlit) import super::anisotropy::{brush, brushed_normal};
 @if(!unlit) import super::base::{Base, base_radiance, filtered_roughness};
+@if(inspect && (punctual_lights || sun) && !unlit) import super::base::Direct;
 @if(clearcoat && !unlit) import super::clearcoat::{coat, under_coat};
 @if(instancing) import super::deform::instanced;
 @if(morph) import super::deform::morphed;
 @if(skin) import super::deform::skinned;
 @if(diffuse_transmission && !unlit) import super::diffuse_transmission::scattering;
+@if(inspect) import super::inspect::{inspected, seen};
 import super::interface::{base_color_sampler, draw, material, Varying, Vertex};
 @if(iridescence && !unlit) import super::iridescence::film;
 @if((punctual_lights || sun) && !unlit) import super::punctual::{direct_light, LitPoint};
@@ -64,6 +67,11 @@ fn base_color(in: Varying) -> vec4f {
     let uv = texture_coordinate(material.base_color_uv_u, material.base_color_uv_v, in.uv0, in.uv1);
     var color = material.base_color_factor * textureSample(base_color_texture, base_color_sampler, uv);
     @if(vertex_color) color *= in.color;
+    @if(inspect) {
+        let size = textureDimensions(base_color_texture);
+        seen.mip = mip_level(uv, size, textureNumLevels(base_color_texture));
+        seen.base_color = color;
+    }
     return color;
 }
 
@@ -135,7 +143,25 @@ fn base_layer(in: Varying, color: vec3f, geometric_normal: vec3f, facing: f32, v
     @if(diffuse_transmission) base.metallic = metallic;
     @if(diffuse_transmission) base.scattering = scattering(in);
     @if(iridescence) base.film = film(in);
+    @if(inspect) {
+        seen.roughness = metallic_roughness.y;
+        seen.metalness = metallic;
+        seen.f0 = base.f0;
+        seen.occlusion = base.occlusion;
+        seen.geometric_normal = facing * geometric_normal;
+        seen.shading_normal = base.normal;
+        @if(anisotropy || clearcoat || normal_map) seen.tangent = in.tangent.xyz;
+    }
     return base;
+}
+
+// What the base radiates without the scene's own lights and the sun.
+@if(inspect && (punctual_lights || sun) && !unlit)
+fn environment_radiance(base: Base) -> vec3f {
+    var unlit = base;
+    var no_light: Direct;
+    unlit.direct = no_light;
+    return base_radiance(unlit);
 }
 
 @if(!unlit)
@@ -148,17 +174,33 @@ fn shade(in: Varying, color: vec3f, facing: f32) -> vec3f {
     @if(punctual_lights || sun) point.position = in.world_position;
     @if(sun) point.sunlight = sunlight(in.world_position, facing * geometric_normal);
     @if(punctual_lights || sun) base.direct = direct_light(base, point);
+    @if(inspect && (punctual_lights || sun)) let environment_alone = environment_radiance(base);
     var radiance = base_radiance(base);
+    @if(inspect && (punctual_lights || sun)) seen.lobes.punctual = radiance - environment_alone;
     @if(sheen && !unlit) {
         let sheen = sheen(in);
         radiance = under_sheen(radiance, sheen, base.normal, view, base.occlusion);
-        @if(punctual_lights || sun) radiance += direct_sheen(sheen, base.normal, view, point);
+        @if(punctual_lights || sun) {
+            let direct = direct_sheen(sheen, base.normal, view, point);
+            radiance += direct;
+            @if(inspect) seen.lobes.sheen += direct;
+            @if(inspect) seen.lobes.punctual += direct;
+        }
     }
-    @if(emission && !unlit) radiance += emission(in);
+    @if(emission && !unlit) {
+        let emission = emission(in);
+        radiance += emission;
+        @if(inspect) seen.lobes.emission = emission;
+    }
     @if(clearcoat && !unlit) {
         let coat = coat(in, geometric_normal, facing);
         radiance = under_coat(radiance, coat, view, base.occlusion);
-        @if(punctual_lights || sun) radiance += direct_coat(coat, view, point);
+        @if(punctual_lights || sun) {
+            let direct = direct_coat(coat, view, point);
+            radiance += direct;
+            @if(inspect) seen.lobes.clearcoat += direct;
+            @if(inspect) seen.lobes.punctual += direct;
+        }
     }
     return radiance;
 }
@@ -179,5 +221,10 @@ fn fs_main(in: Varying, @builtin(front_facing) front_facing: bool) -> @location(
     }
     var alpha = 1.0;
     @if(alpha_blend) alpha = color.a;
-    return vec4f(within_f16(radiance), alpha);
+    @if(inspect) {
+        seen.uv0 = in.uv0;
+        seen.uv1 = in.uv1;
+        return inspected(radiance, alpha);
+    }
+    @else return vec4f(within_f16(radiance), alpha);
 }

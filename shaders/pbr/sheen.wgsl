@@ -3,6 +3,7 @@
 import lib::environment::{sheen_albedo, sheen_radiance};
 import lib::material::texture_coordinate;
 import lib::vector::max_component;
+@if(inspect) import super::inspect::{cover, seen};
 import super::interface::{material, Varying};
 
 @group(1) @binding(17) var sheen_color_texture: texture_2d<f32>;
@@ -29,5 +30,9 @@ fn sheen(in: Varying) -> Sheen {
 fn under_sheen(below: vec3f, sheen: Sheen, normal: vec3f, view: vec3f, occlusion: f32) -> vec3f {
     let albedo = sheen_albedo(saturate(dot(normal, view)), sheen.perceptual_roughness);
     let incoming = sheen_radiance(normal, sheen.perceptual_roughness);
+    @if(inspect) {
+        cover(1.0 - max_component(sheen.color) * albedo);
+        seen.lobes.sheen = sheen.color * albedo * incoming * occlusion;
+    }
     return sheen.color * albedo * incoming * occlusion + below * (1.0 - max_component(sheen.color) * albedo);
 }

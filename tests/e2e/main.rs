@@ -16,6 +16,8 @@ mod faults;
 #[cfg(feature = "preview")]
 mod golden;
 mod harness;
+#[cfg(feature = "preview")]
+mod inspect;
 mod live;
 #[cfg(feature = "preview")]
 mod parameters;

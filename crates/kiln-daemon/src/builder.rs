@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use kiln_build::{ActionId, Digest, Engine, Error, Outcome, RunOptions, Status};
 use kiln_link::{ActionTime, ProgressReport, Revision, RevisionTable, Server, Work};
-use kiln_project::{Built, build, write_outputs};
+use kiln_project::{Built, Wishes, build_with, write_outputs};
 
 use crate::watch::Batch;
 
@@ -190,7 +190,8 @@ impl BuilderThread {
             cancel: &self.cancel,
             progress: &progress,
         };
-        let result = build(&self.engine, changed, &options);
+        let wishes = Wishes::among(self.server.wanted().iter());
+        let result = build_with(&self.engine, changed, wishes, &options);
         report("");
         result
     }

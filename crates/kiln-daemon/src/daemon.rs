@@ -9,6 +9,7 @@ use std::time::{Duration, Instant, SystemTime};
 use kiln_build::{Engine, Error, Store};
 use kiln_diagnostic::Diagnostic;
 use kiln_link::{LockError, ProjectLock, RevisionTable, Server, ServerEvent, socket_path};
+use kiln_project::Wishes;
 
 use crate::builder::{BuildResult, Builder, BuilderOptions};
 use crate::watch::{Batch, UNFINISHED, Watch, send_batches, unix_ms};
@@ -123,6 +124,8 @@ pub struct Daemon {
     relevant: Vec<String>,
     /// [`kiln_build::SourceTree::names_version`] of them.
     relevant_version: u64,
+    /// What clients wished for when the last build began.
+    built_for: Wishes,
     _lock: ProjectLock,
 }
 
@@ -177,6 +180,7 @@ impl Daemon {
             retry: None,
             relevant: Vec::new(),
             relevant_version: 0,
+            built_for: Wishes::default(),
             _lock: lock,
         };
         daemon.begin_build(Batch::default());
@@ -205,6 +209,7 @@ impl Daemon {
                     if is_stop {
                         return self.builder.cancel();
                     }
+                    self.heed_wishes();
                 }
                 Event::ContentLost => {
                     self.is_incomplete = true;
@@ -249,7 +254,20 @@ impl Daemon {
         }
     }
 
+    fn wishes(&self) -> Wishes {
+        Wishes::among(self.server.wanted().iter())
+    }
+
+    /// Builds anew if clients want something else than the last build was for.
+    fn heed_wishes(&mut self) {
+        if self.building.is_none() && self.wishes() != self.built_for {
+            self.begin_build(Batch::default());
+        }
+    }
+
     fn begin_build(&mut self, batch: Batch) {
+        // The builder looks again when it begins: who comes in between is heard of, and may cost an idle build.
+        self.built_for = self.wishes();
         self.building = Some(Batch::default());
         self.server.set_building(Some(batch.files.iter().cloned().collect()));
         self.builder.request(batch);
@@ -306,6 +324,7 @@ impl Daemon {
             notify(Notice::Building { files: unseen.files.iter().cloned().collect() });
             self.begin_build(unseen);
         }
+        self.heed_wishes();
     }
 
     /// The table as it would be had the files that are just being written not been looked at.

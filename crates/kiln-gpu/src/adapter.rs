@@ -61,11 +61,12 @@ pub(crate) fn rank(info: &AdapterInfo) -> (bool, bool, u8) {
     (info.device_type == DeviceType::Cpu, info.backend == Backend::Gl, power)
 }
 
-/// Asks for what the adapter has: its own limits, and filtering of 32-bit floats where it is offered.
+/// Asks for what the adapter has: its own limits, filtering of 32-bit floats, and clocks around passes, where they are offered.
 pub fn device_descriptor(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
     wgpu::DeviceDescriptor {
         label: Some("kiln"),
-        required_features: adapter.features() & wgpu::Features::FLOAT32_FILTERABLE,
+        required_features: adapter.features()
+            & (wgpu::Features::FLOAT32_FILTERABLE | wgpu::Features::TIMESTAMP_QUERY),
         required_limits: adapter.limits(),
         ..Default::default()
     }

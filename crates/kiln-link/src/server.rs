@@ -46,6 +46,11 @@ pub enum ServerEvent {
         /// Why.
         reason: String,
     },
+    /// A client wants something else than before: see [`Server::wanted`].
+    Wants {
+        /// Which.
+        client: u64,
+    },
     /// A client saw a revision: one that it was told of, and each but once.
     Frame {
         /// Which.
@@ -304,7 +309,13 @@ fn receive(shared: &Shared, client: u64, outbox: &Outbox, message: ClientMessage
             }
         }
         ClientMessage::Frame(report) => take_frame(shared, client, outbox, report),
-        ClientMessage::Wants(wants) => outbox.update(|state| state.queue.set_wants(wants)),
+        ClientMessage::Wants(wants) => {
+            let is_new = *outbox.state().queue.wants() != wants;
+            outbox.update(|state| state.queue.set_wants(wants));
+            if is_new {
+                (shared.events)(ServerEvent::Wants { client });
+            }
+        }
         ClientMessage::Ping(number) => outbox.update(|state| state.pong = Some(number)),
         ClientMessage::Pong(number) => outbox.state().take_pong(number),
         ClientMessage::Status => {

@@ -16,7 +16,7 @@ use crate::program::{Bound, Program};
 use crate::scene_gpu::GpuScene;
 use crate::shadow::ShadowSource;
 use crate::slot::Slot;
-use crate::uniform::{FrameValues, draw_member, fill_block, material_member};
+use crate::uniform::{FrameValues, InspectValues, draw_member, fill_block, material_member};
 
 /// What all draws of one program share: group 0 with the buffer that each frame writes, and what the author added.
 #[derive(Debug)]
@@ -27,6 +27,7 @@ pub(crate) struct FrameBinding {
     /// With how many fit.
     lights: Option<(wgpu::Buffer, usize)>,
     sun: Option<(wgpu::Buffer, Bound)>,
+    inspect: Option<(wgpu::Buffer, Bound)>,
 }
 
 /// What programs share that are drawn in one pass.
@@ -51,6 +52,8 @@ impl FrameBinding {
             let capacity = bound.light_capacity()?;
             Some((uniform_buffer(gpu, bound, Vec::new()), capacity))
         });
+        let inspect = program.groups[0].iter().find(|bound| bound.slot == Slot::Inspect);
+        let inspect = inspect.map(|bound| (uniform_buffer(gpu, bound, Vec::new()), bound.clone()));
         let resource = |bound: &Bound| {
             let view = match bound.slot {
                 Slot::Frame => return block.as_ref().map(|(buffer, _)| buffer.as_entire_binding()),
@@ -60,6 +63,7 @@ impl FrameBinding {
                     return shadow.map(|shadow| wgpu::BindingResource::Sampler(shadow.sampler));
                 }
                 Slot::SunShadow => shadow.map(|shadow| shadow.view),
+                Slot::Inspect => return inspect.as_ref().map(|(buffer, _)| buffer.as_entire_binding()),
                 Slot::EnvSampler | Slot::LutSampler => {
                     return Some(wgpu::BindingResource::Sampler(&environment.sampler));
                 }
@@ -75,7 +79,7 @@ impl FrameBinding {
             view.map(wgpu::BindingResource::TextureView)
         };
         let group = create_group(gpu, program, 0, resource);
-        FrameBinding { group, own: program.own_group.clone(), block, lights, sun }
+        FrameBinding { group, own: program.own_group.clone(), block, lights, sun, inspect }
     }
 
     /// Writes the lights as they are in this frame. Those beyond the room that the shader has are left out, the weakest first.
@@ -83,6 +87,13 @@ impl FrameBinding {
         if let Some((buffer, capacity)) = &self.lights {
             let drawn = lights::strongest(lights, scene, *capacity);
             gpu.queue.write_buffer(buffer, 0, &lights::block(&drawn));
+        }
+    }
+
+    /// Writes which channel to show.
+    pub fn write_inspect(&self, gpu: &Gpu, values: &InspectValues) {
+        if let Some((buffer, Bound { block: Some((size_bytes, members)), .. })) = &self.inspect {
+            gpu.queue.write_buffer(buffer, 0, &fill_block(*size_bytes, members, |name| values.member(name)));
         }
     }
 

@@ -7,7 +7,6 @@ use std::time::Duration;
 
 use kiln_link::{Client, ClientEvent, FrameReport};
 
-use crate::view::Selection;
 use crate::worker::unix_ms;
 
 /// How often a finished frame is looked for while the daemon waits for one; its times are taken elsewhere.
@@ -50,9 +49,9 @@ impl Connection {
     }
 
     /// Tells the daemon what is shown: its contents come first.
-    pub fn want(&self, selection: &Selection) {
+    pub fn want(&self, targets: Vec<String>) {
         // The thread ends only with the window.
-        drop(self.wants.send(selection.targets()));
+        drop(self.wants.send(targets));
     }
 
     /// Where finished frames are reported.

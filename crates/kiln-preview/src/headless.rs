@@ -9,7 +9,10 @@ use kiln_image::Image;
 use kiln_link::Revision;
 
 use crate::assignment::{Assignment, RefusedParameter};
+use crate::faults::FaultCounts;
+use crate::pass_timer::PassTime;
 use crate::prepare::Preparer;
+use crate::probe::PixelProbe;
 use crate::renderer::Renderer;
 use crate::report::ApplyReport;
 use crate::view::{Selection, View};
@@ -118,6 +121,34 @@ impl HeadlessViewer {
         let rgb = bytes.chunks_exact(8).flat_map(|texel| texel[..6].chunks_exact(2).map(channel)).collect();
         let incomplete = |_| GpuError::Readback { reason: "the picture is incomplete".to_owned() };
         Image::new(size[0], size[1], rgb).map_err(incomplete)
+    }
+
+    /// How long the passes of the last frame took; `None` where the device has no clocks for them. Ask after
+    /// [`HeadlessViewer::draw`].
+    pub fn take_pass_times(&self) -> Option<Vec<PassTime>> {
+        self.renderer.inspector().take_pass_times()
+    }
+
+    /// Draws a frame and says what it holds at a pixel, column and row from the upper left; `None` outside of it.
+    ///
+    /// # Errors
+    /// [`GpuError::Readback`] when the device is lost.
+    pub fn probe(&mut self, pixel: [u32; 2]) -> Result<Option<PixelProbe>, GpuError> {
+        self.renderer.keeps_depth = true;
+        self.renderer.render(&self.view);
+        let Some(pending) = self.renderer.probe(pixel) else { return Ok(None) };
+        self.gpu.wait()?;
+        let lost = |_| GpuError::Readback { reason: "the answer never came".to_owned() };
+        pending.take(&self.gpu).map_err(lost)
+    }
+
+    /// Draws a frame and counts the pixels that [`View::fault_limit`] marks; `None` if it marks none, or the device cannot count.
+    ///
+    /// # Errors
+    /// [`GpuError::Readback`] when the device is lost.
+    pub fn count_faults(&mut self) -> Result<Option<FaultCounts>, GpuError> {
+        self.draw()?;
+        Ok(self.renderer.inspector().take_faults())
     }
 
     /// Whether frames go through a picture of the opaque scene.

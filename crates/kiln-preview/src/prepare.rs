@@ -11,13 +11,15 @@ use kiln_shader::Reflection;
 
 use crate::draw_list::DrawList;
 use crate::harmonics;
+use crate::inspect::{self, InspectionState};
 use crate::keeper::{Keeper, Key};
+use crate::material_list;
 use crate::neutral;
 use crate::own::OwnTextures;
 use crate::parameter::{OfferedParameter, ParameterValues};
 use crate::program::{Program, Raster};
 use crate::report::{ApplyReport, choose, describe};
-use crate::scene_gpu::GpuScene;
+use crate::scene_gpu::{GpuScene, all_draws};
 use crate::sun::Sun;
 use crate::target::{CubeMeta, LutMeta, ProjectMeta, Role, SceneMeta, ShaderMeta, read_meta};
 use crate::texture::{CubeTexture, LutTexture, create_trilinear_sampler};
@@ -50,6 +52,8 @@ pub(crate) struct Prepared {
     pub tonemap_pipeline: wgpu::RenderPipeline,
     /// Whether a shader in use reads the time.
     pub is_animated: bool,
+    /// The same scene with the variants that show channels; empty where nobody asked for them.
+    pub inspect: DrawList,
 }
 
 /// Makes [`Prepared`]s and keeps what several of them share.
@@ -133,6 +137,10 @@ impl Preparer {
         });
         let sun = environment.sun.and(env.as_deref());
         report.has_sun = sun.is_some();
+        let inspect = scene.as_ref().map(|scene| {
+            let wish = Wish { variant, shader: &shader, sun };
+            self.inspect_draws(revision, scene, &wish, &mut report)
+        });
         let draws = scene.as_ref().map(|scene| {
             let wish = Wish { variant, shader: &shader, sun };
             self.draws(revision, scene, &wish, &mut report)
@@ -157,6 +165,7 @@ impl Preparer {
             tonemap,
             tonemap_pipeline,
             is_animated,
+            inspect: inspect.unwrap_or_default(),
         })
     }
 
@@ -389,6 +398,47 @@ impl Preparer {
                 count - capacity
             ));
         }
+        draws
+    }
+
+    /// The scene with variants that show channels, as far as they are there.
+    fn inspect_draws(
+        &mut self,
+        revision: &Revision,
+        scene: &GpuScene,
+        wish: &Wish<'_>,
+        report: &mut ApplyReport,
+    ) -> DrawList {
+        let &Wish { variant, shader, sun } = wish;
+        let overrides = project_meta(revision).effects;
+        let lit = |effects: &EffectSet| match sun {
+            Some(_) => overrides.under_sun(effects),
+            None => effects.clone(),
+        };
+        let of_draw =
+            |draw| lit(&overrides.apply(&scene.scene.effects(draw, scene.scene.material_of(draw, variant))));
+        let sets = all_draws(&scene.scene).map(of_draw).collect();
+        report.materials = material_list::list(&scene.scene, variant, &|own| lit(&overrides.apply(own)));
+        report.inspection = inspect::describe(revision, shader, &sets);
+        if report.inspection.state != InspectionState::Ready {
+            return DrawList::default();
+        }
+        let gpu = self.uploader.gpu.clone();
+        let mut find = |effects: &EffectSet| {
+            // The scene may be shown in the light of an environment that it was not planned for.
+            let effects = overrides.apply(effects);
+            let name = |effects: &EffectSet| format!("{}/{shader}/{}", inspect::GROUP, variant_name(effects));
+            let in_its_light = name(&lit(&effects));
+            let is_there = revision.table.targets.contains_key(&in_its_light);
+            let name = if is_there { in_its_light } else { name(&effects) };
+            let program = self.program(revision, &name, Role::Material, report);
+            program.or_else(|| self.programs.last_good(&name))
+        };
+        let (draws, fault) = gpu.catch_errors(|| DrawList::new(&gpu, scene, variant, false, &mut find));
+        let faulty = |fault: String| {
+            Diagnostic::error("the scene cannot be bound to the shaders that show channels").with_note(fault)
+        };
+        report.diagnostics.extend(fault.map(faulty));
         draws
     }
 

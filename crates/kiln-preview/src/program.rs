@@ -14,7 +14,7 @@ use crate::parameter::{OfferedParameter, ParameterValues, offered};
 use crate::slot::Slot;
 use crate::sun::SunValues;
 use crate::target::Role;
-use crate::uniform::{FrameValues, Value, draw_member, long_type_name, material_member};
+use crate::uniform::{FrameValues, InspectValues, Value, draw_member, long_type_name, material_member};
 use crate::vertex_input::VertexInputs;
 
 /// Format of the image that material and background shaders write.
@@ -208,6 +208,11 @@ impl Program {
     /// Whether it reads what the sun does not reach.
     pub fn reads_sun_shadow(&self) -> bool {
         self.groups[0].iter().any(|bound| bound.slot == Slot::SunShadow)
+    }
+
+    /// Name of its target.
+    pub fn name(&self) -> &str {
+        &self.name
     }
 
     /// Whether pictures change with time.
@@ -410,7 +415,12 @@ fn check_binding(shader: &str, role: Role, binding: &Binding) -> Result<Slot, Di
     let is_of_material = [1, 2].contains(&slot.group())
         || matches!(
             slot,
-            Slot::Lights | Slot::SceneColor | Slot::Sun | Slot::SunShadow | Slot::SunShadowSampler
+            Slot::Lights
+                | Slot::Inspect
+                | Slot::SceneColor
+                | Slot::Sun
+                | Slot::SunShadow
+                | Slot::SunShadowSampler
         );
     if is_of_material && role != Role::Material {
         return Err(Diagnostic::error(format!("`{shader}` declares `{name}`, which only materials have")));
@@ -477,6 +487,7 @@ fn check_members(
 fn example_of(slot: Slot, member: &str) -> Option<Value> {
     match slot {
         Slot::Frame => FrameValues::default().member(member),
+        Slot::Inspect => InspectValues::default().member(member),
         Slot::Material => material_member(&crate::neutral::material(), member),
         Slot::Sun => SunValues::default().member(member),
         Slot::Draw => draw_member(glam::Mat4::IDENTITY, member),
@@ -530,7 +541,13 @@ fn binding_type(bound: &Bound) -> wgpu::BindingType {
         multisampled: false,
     };
     match bound.slot {
-        Slot::Frame | Slot::Lights | Slot::Sun | Slot::Material | Slot::Draw | Slot::Params => {
+        Slot::Frame
+        | Slot::Lights
+        | Slot::Inspect
+        | Slot::Sun
+        | Slot::Material
+        | Slot::Draw
+        | Slot::Params => {
             wgpu::BindingType::Buffer {
                 ty: wgpu::BufferBindingType::Uniform,
                 // Draws share one buffer, each at its own offset.

@@ -12,15 +12,19 @@ use crate::binding::{FrameBinding, Shared};
 use crate::camera::OrbitCamera;
 use crate::draw_list::{DrawItem, DrawList, front_face};
 use crate::ground::{Floor, GroundPainter};
+use crate::inspector::{Inspector, LastFrame};
+use crate::picture::Picture;
 use crate::pose::Pose;
 use crate::prepare::Prepared;
-use crate::program::{DEPTH_FORMAT, HDR_FORMAT, OUTPUT_FORMAT, Program, Raster, SAMPLE_COUNT};
+use crate::program::{Program, Raster};
 use crate::scene_color::{Downsampler, SceneColor};
 use crate::scene_gpu::GpuScene;
 use crate::shadow::{Contents, Frustum, ShadowMap, ShadowReader};
 use crate::sun::{Sun, SunValues};
 use crate::uniform::FrameValues;
 use crate::view::{AnimationTime, Background, Ground, View};
+
+mod channels;
 
 /// Draws one prepared revision after another; what it shows changes only by [`Renderer::show`].
 #[derive(Debug)]
@@ -36,6 +40,9 @@ pub(crate) struct Renderer {
     backdrop: OnceCell<Backdrop>,
     /// Made for the first view with a floor.
     ground: OnceCell<GroundPainter>,
+    inspector: Inspector,
+    /// Whether probes may ask for the depth of frames.
+    pub keeps_depth: bool,
 }
 
 /// What is shown, bound to the picture.
@@ -53,6 +60,8 @@ struct Shown {
     written: Option<Option<AnimationTime>>,
     /// If something reads it.
     shadow: Option<ShadowMap>,
+    /// Of each program of the draws that show channels.
+    inspect: Vec<FrameBinding>,
 }
 
 /// How the scene is drawn: at once, or with a picture of what is opaque between.
@@ -70,18 +79,20 @@ struct Behind<'a> {
     ground: Option<(&'a GroundPainter, Ground)>,
 }
 
-/// The images a frame goes through.
-#[derive(Debug)]
-struct Picture {
-    size: [u32; 2],
-    /// Linear radiance, several samples a pixel.
-    samples: wgpu::TextureView,
-    /// Linear radiance.
-    radiance: wgpu::Texture,
-    hdr: wgpu::TextureView,
-    depth: wgpu::TextureView,
-    output: wgpu::Texture,
-    output_view: wgpu::TextureView,
+/// What the scene is drawn with in a pass, and over what.
+struct Look<'a> {
+    label: &'static str,
+    draws: &'a DrawList,
+    /// Of each of the draw list's programs.
+    frames: &'a [FrameBinding],
+    /// What stands behind it, of the preview's own or the environment; `None` leaves that empty.
+    behind: Option<&'a Behind<'a>>,
+    /// Whether what is blended is; else it hides what lies behind.
+    blends: bool,
+    /// What is seen where nothing is drawn.
+    empty: wgpu::Color,
+    /// Whether the samples are read later.
+    keeps_samples: bool,
 }
 
 impl Renderer {
@@ -96,6 +107,8 @@ impl Renderer {
             shadow_reader: OnceCell::new(),
             backdrop: OnceCell::new(),
             ground: OnceCell::new(),
+            inspector: Inspector::new(gpu),
+            keeps_depth: false,
         }
     }
 
@@ -114,7 +127,7 @@ impl Renderer {
 
     /// Replaces what is shown.
     pub fn show(&mut self, prepared: Arc<Prepared>) {
-        let Prepared { draws, environment, .. } = &*prepared;
+        let Prepared { draws, environment, inspect, .. } = &*prepared;
         let scene_color = draws.reads_scene_color().then(|| {
             let downsampler = self.downsampler.get_or_init(|| Downsampler::new(&self.gpu));
             SceneColor::new(&self.gpu, downsampler, self.picture.size)
@@ -128,6 +141,7 @@ impl Renderer {
             FrameBinding::new(&self.gpu, program, &Shared { environment, picture, shadow: read })
         };
         let behind = scene_color.as_ref().map(|scene| &scene.view);
+        let of_channels = inspect.programs.iter().map(|binding| bind(&binding.program, behind)).collect();
         self.shown = Some(Shown {
             background: prepared.background.as_ref().map(|(_, program)| bind(program, None)),
             programs: draws.programs.iter().map(|binding| bind(&binding.program, behind)).collect(),
@@ -136,6 +150,7 @@ impl Renderer {
             pose: prepared.scene.as_deref().map(Pose::at_rest),
             written: None,
             shadow,
+            inspect: of_channels,
             prepared,
         });
     }
@@ -172,6 +187,11 @@ impl Renderer {
         &self.picture.output_view
     }
 
+    /// Width and height in pixels.
+    pub fn size(&self) -> [u32; 2] {
+        self.picture.size
+    }
+
     /// Width / height.
     pub fn aspect(&self) -> f32 {
         self.picture.size[0] as f32 / self.picture.size[1] as f32
@@ -193,28 +213,86 @@ impl Renderer {
         self.shown.as_mut()?.take_pose(&self.gpu, view.animation);
         let shown = self.shown.as_ref()?;
         let values = self.frame_values(shown, view);
-        for frame in shown.background.iter().chain(&shown.programs).chain([&shown.tonemap]) {
+        let of_materials = || shown.programs.iter().chain(&shown.inspect);
+        for frame in shown.background.iter().chain(of_materials()).chain([&shown.tonemap]) {
             frame.write(&self.gpu, &values, &view.parameters);
         }
         if let (Some(scene), Some(pose)) = (&shown.prepared.scene, &shown.pose) {
             let lights = &pose.posed.lights;
-            shown.programs.iter().for_each(|frame| frame.write_lights(&self.gpu, &scene.scene, lights));
+            of_materials().for_each(|frame| frame.write_lights(&self.gpu, &scene.scene, lights));
         }
         let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         shown.sort_copies(&self.gpu, values.camera_position);
+        self.inspector.begin();
         self.draw_shadow(&mut encoder, shown, &values, view);
         let behind = self.behind(shown, &values, view);
         let eye = values.camera_position;
+        let channel = view.channel.filter(|_| !shown.inspect.is_empty());
+        match channel {
+            None => self.draw_picture(&mut encoder, shown, view, &behind, eye),
+            Some(channel) => self.draw_channel(&mut encoder, shown, channel, &behind, eye),
+        }
+        self.inspector.end(&mut encoder);
+        let mut submission = self.gpu.queue.submit([encoder.finish()]);
+        self.inspector.submitted();
+        if let Some(limit) = view.fault_limit {
+            submission = self.mark_faults(shown, limit, eye).unwrap_or(submission);
+        }
+        let world_from_clip = values.clip_from_world.inverse();
+        self.inspector.note_frame(LastFrame { channel, world_from_clip, exposure_ev: view.exposure_ev });
+        Some(submission)
+    }
+
+    fn draw_picture(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        shown: &Shown,
+        view: &View,
+        behind: &Behind<'_>,
+        eye: Vec3,
+    ) {
+        let look = |label| Look {
+            label,
+            draws: &shown.prepared.draws,
+            frames: &shown.programs,
+            behind: Some(behind),
+            blends: true,
+            empty: wgpu::Color::BLACK,
+            keeps_samples: view.fault_limit.is_some() && shown.inspect.is_empty(),
+        };
         match (&shown.scene_color, self.downsampler.get()) {
             (Some(scene_color), Some(downsampler)) => {
-                self.draw_scene(&mut encoder, shown, &behind, Stage::Opaque, scene_color.base(), eye);
-                downsampler.run(&mut encoder, scene_color);
-                self.draw_scene(&mut encoder, shown, &behind, Stage::Rest, &self.picture.hdr, eye);
+                self.draw_scene_color(encoder, shown, (scene_color, downsampler), behind, eye);
+                let rest = look("transmissive and blended");
+                self.draw_scene(encoder, shown, &rest, Stage::Rest, Some(&self.picture.hdr), eye);
             }
-            _ => self.draw_scene(&mut encoder, shown, &behind, Stage::Whole, &self.picture.hdr, eye),
+            _ => self.draw_scene(encoder, shown, &look("scene"), Stage::Whole, Some(&self.picture.hdr), eye),
         }
-        self.draw_tonemap(&mut encoder, shown);
-        Some(self.gpu.queue.submit([encoder.finish()]))
+        self.draw_tonemap(encoder, shown);
+    }
+
+    /// Draws what is opaque, and its smoother levels, for what transmits light.
+    fn draw_scene_color(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        shown: &Shown,
+        (scene_color, downsampler): (&SceneColor, &Downsampler),
+        behind: &Behind<'_>,
+        eye: Vec3,
+    ) {
+        // Without a background nothing else makes the picture opaque.
+        let alpha = if behind.backdrop.is_some() || shown.background.is_some() { 0.0 } else { 1.0 };
+        let look = Look {
+            label: "opaque",
+            draws: &shown.prepared.draws,
+            frames: &shown.programs,
+            behind: Some(behind),
+            blends: true,
+            empty: wgpu::Color { a: alpha, ..wgpu::Color::BLACK },
+            keeps_samples: true,
+        };
+        self.draw_scene(encoder, shown, &look, Stage::Opaque, Some(scene_color.base()), eye);
+        downsampler.run(encoder, scene_color, self.inspector.timer.as_ref());
     }
 
     fn frame_values(&self, shown: &Shown, view: &View) -> FrameValues {
@@ -299,52 +377,52 @@ impl Renderer {
         &self,
         encoder: &mut wgpu::CommandEncoder,
         shown: &Shown,
-        behind: &Behind<'_>,
+        look: &Look<'_>,
         stage: Stage,
-        resolved: &wgpu::TextureView,
+        resolved: Option<&wgpu::TextureView>,
         eye: Vec3,
     ) {
-        // Without a background nothing else makes the picture opaque.
-        let empty = wgpu::Color {
-            a: if stage == Stage::Opaque && (behind.backdrop.is_some() || shown.background.is_some()) {
-                0.0
-            } else {
-                1.0
-            },
-            ..wgpu::Color::BLACK
-        };
-        let store = if stage == Stage::Opaque { wgpu::StoreOp::Store } else { wgpu::StoreOp::Discard };
-        let color_load = if stage == Stage::Rest { wgpu::LoadOp::Load } else { wgpu::LoadOp::Clear(empty) };
+        let store_if = |is_kept| if is_kept { wgpu::StoreOp::Store } else { wgpu::StoreOp::Discard };
+        let color_load =
+            if stage == Stage::Rest { wgpu::LoadOp::Load } else { wgpu::LoadOp::Clear(look.empty) };
         let depth_load = if stage == Stage::Rest { wgpu::LoadOp::Load } else { wgpu::LoadOp::Clear(1.0) };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("scene"),
+            label: Some(look.label),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
                 view: &self.picture.samples,
                 depth_slice: None,
-                resolve_target: Some(resolved),
-                ops: wgpu::Operations { load: color_load, store },
+                resolve_target: resolved,
+                ops: wgpu::Operations { load: color_load, store: store_if(look.keeps_samples) },
             })],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                 view: &self.picture.depth,
-                depth_ops: Some(wgpu::Operations { load: depth_load, store }),
+                depth_ops: Some(wgpu::Operations {
+                    load: depth_load,
+                    store: store_if(stage == Stage::Opaque || self.keeps_depth),
+                }),
                 stencil_ops: None,
             }),
+            timestamp_writes: self.inspector.timed(look.label),
             ..Default::default()
         });
         // Opaque draws from near to far, so that depth saves shading; others from far to near.
-        let Some(pose) = &shown.pose else { return self.draw_background(&mut pass, shown, behind) };
+        let Some(pose) = &shown.pose else {
+            return look.behind.into_iter().for_each(|behind| self.draw_background(&mut pass, shown, behind));
+        };
         let distance = |item: &DrawItem| pose.draws[item.draw].center.distance_squared(eye);
         let near_first = |items| visible(items, pose, |a, b| distance(a).total_cmp(&distance(b)));
         let far_first = |items| visible(items, pose, |a, b| distance(b).total_cmp(&distance(a)));
-        let DrawList { opaque, transmissive, blended, .. } = &shown.prepared.draws;
+        let DrawList { opaque, transmissive, blended, .. } = look.draws;
         if stage != Stage::Rest {
-            self.draw_items(&mut pass, shown, near_first(opaque));
+            self.draw_items(&mut pass, shown, look, near_first(opaque));
         }
         if stage != Stage::Opaque {
-            self.draw_background(&mut pass, shown, behind);
-            self.draw_ground(&mut pass, shown, behind);
-            self.draw_items(&mut pass, shown, far_first(transmissive));
-            self.draw_items(&mut pass, shown, far_first(blended));
+            if let Some(behind) = look.behind {
+                self.draw_background(&mut pass, shown, behind);
+                self.draw_ground(&mut pass, shown, behind);
+            }
+            self.draw_items(&mut pass, shown, look, far_first(transmissive));
+            self.draw_items(&mut pass, shown, look, far_first(blended));
         }
     }
 
@@ -371,30 +449,37 @@ impl Renderer {
         painter.draw(&self.gpu, pass, ground, &shown.prepared.environment, shadow.as_ref());
     }
 
-    fn draw_items(&self, pass: &mut wgpu::RenderPass<'_>, shown: &Shown, items: Vec<&DrawItem>) {
+    fn draw_items(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        shown: &Shown,
+        look: &Look<'_>,
+        items: Vec<&DrawItem>,
+    ) {
         let (Some(scene), Some(pose)) = (&shown.prepared.scene, &shown.pose) else { return };
         for item in items {
-            self.draw_item(pass, shown, scene, item, pose.draws[item.draw].mirrored);
+            self.draw_item(pass, look, scene, item, pose.draws[item.draw].mirrored);
         }
     }
 
     fn draw_item(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        shown: &Shown,
+        look: &Look<'_>,
         scene: &GpuScene,
         item: &DrawItem,
         mirrored: bool,
     ) {
-        let raster = Raster { front_face: front_face(mirrored), ..item.raster };
+        let blend = item.raster.blend && look.blends;
+        let raster = Raster { front_face: front_face(mirrored), blend, ..item.raster };
         if raster == item.raster {
             pass.set_pipeline(&item.pipeline);
         } else {
-            // Made when an animation first turns the draw inside out.
-            let program = &shown.prepared.draws.programs[item.program].program;
+            // Made when an animation first turns the draw inside out, or a channel first shows what is blended.
+            let program = &look.draws.programs[item.program].program;
             pass.set_pipeline(&program.pipeline(&self.gpu.device, raster));
         }
-        draw_geometry(pass, &shown.programs, scene, item);
+        draw_geometry(pass, look.frames, scene, item);
     }
 
     fn draw_tonemap(&self, encoder: &mut wgpu::CommandEncoder, shown: &Shown) {
@@ -406,6 +491,7 @@ impl Renderer {
                 resolve_target: None,
                 ops: wgpu::Operations::default(),
             })],
+            timestamp_writes: self.inspector.timed("tonemap"),
             ..Default::default()
         });
         pass.set_pipeline(&shown.prepared.tonemap_pipeline);
@@ -473,42 +559,7 @@ impl Shown {
         pose.update(scene, time);
         scene.write_deformation(gpu, &pose.posed);
         self.prepared.draws.write(gpu, scene, pose);
+        self.prepared.inspect.write(gpu, scene, pose);
         self.written = Some(time);
-    }
-}
-
-impl Picture {
-    fn allowed_size(gpu: &Gpu, size: [u32; 2]) -> [u32; 2] {
-        size.map(|pixels| pixels.clamp(1, gpu.device.limits().max_texture_dimension_2d))
-    }
-
-    fn new(gpu: &Gpu, size: [u32; 2]) -> Self {
-        let size = Self::allowed_size(gpu, size);
-        let attachment = wgpu::TextureUsages::RENDER_ATTACHMENT;
-        let read = attachment | wgpu::TextureUsages::TEXTURE_BINDING;
-        let create = |label, format, sample_count, usage| {
-            gpu.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
-                mip_level_count: 1,
-                sample_count,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage,
-                view_formats: &[],
-            })
-        };
-        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let output = create("output", OUTPUT_FORMAT, 1, read | wgpu::TextureUsages::COPY_SRC);
-        let radiance = create("hdr", HDR_FORMAT, 1, read | wgpu::TextureUsages::COPY_SRC);
-        Picture {
-            size,
-            samples: view(&create("samples", HDR_FORMAT, SAMPLE_COUNT, attachment)),
-            hdr: view(&radiance),
-            radiance,
-            depth: view(&create("depth", DEPTH_FORMAT, SAMPLE_COUNT, attachment)),
-            output_view: view(&output),
-            output,
-        }
     }
 }

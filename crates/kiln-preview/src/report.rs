@@ -7,7 +7,9 @@ use kiln_link::{Revision, TargetState};
 use kiln_scene::{Animation, Scene};
 
 use crate::camera::OrbitCamera;
+use crate::inspect::Inspection;
 use crate::keeper::Resolved;
+use crate::material_list::ListedMaterial;
 use crate::parameter::OfferedParameter;
 use crate::target::{ProjectMeta, read_meta};
 use crate::upload::Uploaded;
@@ -46,6 +48,10 @@ pub struct ApplyReport {
     pub uploaded: Uploaded,
     /// Whether the environment's sun is a light of its own, which casts shadows.
     pub has_sun: bool,
+    /// Which channels can be shown.
+    pub inspection: Inspection,
+    /// What the shown scene is made of.
+    pub materials: Vec<ListedMaterial>,
 }
 
 /// An animation to choose.

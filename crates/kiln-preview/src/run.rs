@@ -76,7 +76,7 @@ pub fn run_headless(options: &HeadlessOptions) -> anyhow::Result<HeadlessReport>
     viewer.view = options.view.clone();
     viewer.select(options.selection.clone());
     let client = Client::connect(options.socket.clone(), "preview, headless");
-    client.want(options.selection.targets());
+    client.want(options.selection.targets(&options.view));
     let revision = wait_for_revision(&client, options)?;
     let received_unix_ms = unix_ms();
     viewer.apply(&revision);

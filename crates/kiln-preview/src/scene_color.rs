@@ -5,6 +5,7 @@
 
 use kiln_gpu::Gpu;
 
+use crate::pass_timer::PassTimer;
 use crate::program::HDR_FORMAT;
 
 /// Makes the smaller levels.
@@ -59,8 +60,18 @@ impl Downsampler {
     }
 
     /// Fills the smaller levels from the largest.
-    pub fn run(&self, encoder: &mut wgpu::CommandEncoder, picture: &SceneColor) {
-        for (source, view) in picture.sources.iter().zip(&picture.levels[1..]) {
+    pub fn run(&self, encoder: &mut wgpu::CommandEncoder, picture: &SceneColor, timer: Option<&PassTimer>) {
+        let [mut before, mut after] =
+            timer.and_then(|timer| timer.span("downsample")).map_or([None, None], |span| span.map(Some));
+        for (index, (source, view)) in picture.sources.iter().zip(&picture.levels[1..]).enumerate() {
+            let is_last = index + 1 == picture.sources.len();
+            let timestamp_writes = match (before.take(), is_last.then(|| after.take()).flatten()) {
+                (Some(before), Some(after)) => Some(wgpu::RenderPassTimestampWrites {
+                    end_of_pass_write_index: after.end_of_pass_write_index,
+                    ..before
+                }),
+                (before, after) => before.or(after),
+            };
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("downsample"),
                 color_attachments: &[Some(wgpu::RenderPassColorAttachment {
@@ -69,6 +80,7 @@ impl Downsampler {
                     resolve_target: None,
                     ops: wgpu::Operations::default(),
                 })],
+                timestamp_writes,
                 ..Default::default()
             });
             pass.set_pipeline(&self.pipeline);

@@ -120,6 +120,8 @@ pub(crate) enum Slot {
     Sun,
     SunShadow,
     SunShadowSampler,
+    /// Which channel to show.
+    Inspect,
     Material,
     MaterialTexture(Map),
     MaterialSampler(Map),
@@ -139,7 +141,7 @@ pub(crate) enum Slot {
     OwnSampler,
 }
 
-const FIXED: [(Slot, &str); 22] = [
+const FIXED: [(Slot, &str); 23] = [
     (Slot::Frame, "frame"),
     (Slot::EnvSkybox, "env_skybox"),
     (Slot::EnvIrradiance, "env_irradiance"),
@@ -155,6 +157,7 @@ const FIXED: [(Slot, &str); 22] = [
     (Slot::Sun, "sun"),
     (Slot::SunShadow, "sun_shadow"),
     (Slot::SunShadowSampler, "sun_shadow_sampler"),
+    (Slot::Inspect, "inspect"),
     (Slot::Material, "material"),
     (Slot::Draw, "draw"),
     (Slot::JointMatrices, "joint_matrices"),
@@ -228,7 +231,13 @@ impl Slot {
     /// What a shader must declare it as.
     pub fn expects(self) -> &'static str {
         match self {
-            Slot::Frame | Slot::Lights | Slot::Sun | Slot::Material | Slot::Draw | Slot::Params => "uniform",
+            Slot::Frame
+            | Slot::Lights
+            | Slot::Inspect
+            | Slot::Sun
+            | Slot::Material
+            | Slot::Draw
+            | Slot::Params => "uniform",
             Slot::SunShadow => DEPTH,
             Slot::SunShadowSampler => COMPARISON,
             Slot::JointMatrices | Slot::Instances => MATRICES,

@@ -16,6 +16,7 @@ pub(crate) enum Value {
     Vec3([f32; 3]),
     Vec4([f32; 4]),
     Mat4([f32; 16]),
+    U32(u32),
 }
 
 impl Value {
@@ -27,16 +28,18 @@ impl Value {
             Value::Vec3(_) => "vec3<f32>",
             Value::Vec4(_) => "vec4<f32>",
             Value::Mat4(_) => "mat4x4<f32>",
+            Value::U32(_) => "u32",
         }
     }
 
-    fn floats(&self) -> &[f32] {
+    fn bytes(&self) -> &[u8] {
         match self {
-            Value::F32(value) => std::slice::from_ref(value),
-            Value::Vec2(values) => values,
-            Value::Vec3(values) => values,
-            Value::Vec4(values) => values,
-            Value::Mat4(values) => values,
+            Value::F32(value) => bytemuck::bytes_of(value),
+            Value::Vec2(values) => bytemuck::cast_slice(values),
+            Value::Vec3(values) => bytemuck::cast_slice(values),
+            Value::Vec4(values) => bytemuck::cast_slice(values),
+            Value::Mat4(values) => bytemuck::cast_slice(values),
+            Value::U32(value) => bytemuck::bytes_of(value),
         }
     }
 }
@@ -91,6 +94,26 @@ impl FrameValues {
             "time_s" => self.time_s.into(),
             _ => return None,
         })
+    }
+}
+
+/// What variants that show channels are told.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct InspectValues {
+    pub channel: u32,
+    pub radiance_max: f32,
+    pub variant_color: [f32; 3],
+}
+
+impl InspectValues {
+    /// The value of a member of `inspect`; `None` for unknown names.
+    pub fn member(&self, name: &str) -> Option<Value> {
+        match name {
+            "channel" => Some(Value::U32(self.channel)),
+            "radiance_max" => Some(self.radiance_max.into()),
+            "variant_color" => Some(Value::Vec3(self.variant_color)),
+            _ => None,
+        }
     }
 }
 
@@ -188,7 +211,7 @@ pub(crate) fn fill_block(
     let mut block = vec![0; size_bytes as usize];
     for member in members {
         let Some(value) = lookup(&member.name) else { continue };
-        let bytes: &[u8] = bytemuck::cast_slice(value.floats());
+        let bytes = value.bytes();
         let start = member.offset_bytes as usize;
         if let Some(place) = block.get_mut(start..start + bytes.len()) {
             place.copy_from_slice(bytes);

@@ -3,6 +3,8 @@
 use std::str::FromStr;
 
 use crate::camera::OrbitCamera;
+use crate::channel::Channel;
+use crate::inspect::GROUP;
 use crate::parameter::ParameterValues;
 
 /// Which scene and environment to show.
@@ -38,10 +40,11 @@ pub struct AnimationTime {
 }
 
 impl Selection {
-    /// The targets, or groups of them, that it names.
-    pub(crate) fn targets(&self) -> Vec<String> {
+    /// The targets, or groups of them, that it names; with those that a view of it needs besides.
+    pub(crate) fn targets(&self, view: &View) -> Vec<String> {
         let scene = self.scene.iter().map(|name| format!("scene/{name}"));
-        scene.chain(self.env.iter().map(|name| format!("env/{name}"))).collect()
+        let env = self.env.iter().map(|name| format!("env/{name}"));
+        scene.chain(env).chain(view.inspects().then(|| GROUP.to_owned())).collect()
     }
 }
 
@@ -110,7 +113,8 @@ impl FromStr for Ground {
     }
 }
 
-/// How the selected scene is shown. None of it needs a rebuild.
+/// How the selected scene is shown. None of it needs a rebuild, but that channels and marks need variants of the scene's
+/// shader which the daemon makes for who wants them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
     /// Exposure in stops: radiance is multiplied by 2^EV.
@@ -135,6 +139,17 @@ pub struct View {
     pub background: Background,
     /// What is below it.
     pub ground: Ground,
+    /// What is shown in place of the picture, where the scene's shader can show it.
+    pub channel: Option<Channel>,
+    /// Marks radiance that is no number, infinite, negative, or above this; `None` marks nothing.
+    pub fault_limit: Option<f32>,
+}
+
+impl View {
+    /// Whether it needs the shaders that show channels.
+    pub(crate) fn inspects(&self) -> bool {
+        self.channel.is_some() || self.fault_limit.is_some()
+    }
 }
 
 impl Default for View {
@@ -152,6 +167,8 @@ impl Default for View {
             parameters: ParameterValues::default(),
             background: Background::Environment,
             ground: Ground::default(),
+            channel: None,
+            fault_limit: None,
         }
     }
 }

@@ -73,6 +73,8 @@ struct Window {
     revision: Option<(Arc<Revision>, f64)>,
     /// What the worker was last asked for.
     requested: (Selection, ParameterValues),
+    /// What the daemon was last told.
+    told_wants: Vec<String>,
 }
 
 impl Window {
@@ -99,6 +101,7 @@ impl Window {
             panels,
             revision: None,
             requested: (options.selection, ParameterValues::default()),
+            told_wants: Vec::new(),
         })
     }
 
@@ -119,9 +122,6 @@ impl Window {
         }
         if let Some(ready) = self.worker.take() {
             let is_new = ready.prepared.report.revision != self.panels.report.revision;
-            if ready.prepared.report.shown != self.panels.report.shown {
-                self.connection.want(&ready.prepared.report.shown);
-            }
             self.panels.report = ready.prepared.report.clone();
             self.picture.replace(ready, is_new);
         }
@@ -138,6 +138,15 @@ impl Window {
         self.panels.receive(&revision.table);
         self.revision = Some((revision, received_unix_ms));
         self.request();
+    }
+
+    /// Tells the daemon what is shown, when that changes.
+    fn tell_wants(&mut self) {
+        let wants = self.panels.report.shown.targets(&self.panels.view);
+        if wants != self.told_wants {
+            self.connection.want(wants.clone());
+            self.told_wants = wants;
+        }
     }
 
     /// What has to be prepared.
@@ -166,6 +175,7 @@ impl eframe::App for Window {
         if self.wanted() != self.requested {
             self.request();
         }
+        self.tell_wants();
     }
 
     fn clear_color(&self, _visuals: &egui::Visuals) -> [f32; 4] {

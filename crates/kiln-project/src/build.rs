@@ -8,7 +8,7 @@ use kiln_build::{ActionId, Engine, Error, RunOptions, RunReport, TargetState, Ta
 use kiln_diagnostic::{Diagnostic, Severity};
 
 use crate::Project;
-use crate::plan::{PartSpec, Plan, TargetSpec, plan, plan_project};
+use crate::plan::{PartSpec, Plan, TargetSpec, Wishes, plan_project, plan_with};
 
 /// A finished build.
 pub struct Built {
@@ -38,13 +38,26 @@ pub fn build(
     changed: Option<&[String]>,
     options: &RunOptions,
 ) -> Result<Option<Built>, Error> {
+    build_with(engine, changed, Wishes::default(), options)
+}
+
+/// Does what [`build`] does, for somebody with wishes of their own.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_with(
+    engine: &Engine,
+    changed: Option<&[String]>,
+    wishes: Wishes,
+    options: &RunOptions,
+) -> Result<Option<Built>, Error> {
     let mut changed = changed;
     heal(options, |is_first| {
         if !is_first {
             changed = None;
         }
         let start = Instant::now();
-        let plan = plan(engine, changed)?;
+        let plan = plan_with(engine, changed, wishes)?;
         let plan_ms = start.elapsed().as_secs_f64() * 1e3;
         let Some((report, run_ms)) = run_plan(engine, &plan, options)? else { return Ok(None) };
         let (targets, diagnostics) = plan.resolve(engine, &report);
@@ -63,7 +76,7 @@ pub fn build_apart(engine: &Engine, project: &Project, options: &RunOptions) -> 
     heal(options, |_| {
         let start = Instant::now();
         engine.begin_plan(None);
-        let plan = plan_project(engine, project.clone(), Vec::new())?;
+        let plan = plan_project(engine, project.clone(), Vec::new(), Wishes::default())?;
         let plan_ms = start.elapsed().as_secs_f64() * 1e3;
         let Some((report, run_ms)) = run_plan(engine, &plan, options)? else { return Ok(None) };
         let (targets, diagnostics) = plan.resolve_fresh(&report);

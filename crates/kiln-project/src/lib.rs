@@ -9,7 +9,7 @@
 //!
 //! Not here: how maps are computed (`kiln-bake`), caching (`kiln-build`), watching (`kiln-daemon`).
 
-pub use build::{Built, HEALING_TRIES_MAX, build, build_apart};
+pub use build::{Built, HEALING_TRIES_MAX, build, build_apart, build_with};
 pub use export::{CONVENTIONS_FILE, ExportFailure, Exported, export, wished};
 // The limits of an environment are those of its recipe.
 pub use check::{Difference, DifferenceKind, differences};
@@ -27,7 +27,7 @@ pub use lut_config::{LutConfig, TABLES, table_name};
 pub use output::{
     MANIFEST_FILE, Manifest, ManifestFile, ManifestTarget, Written, lock_folder, manifest_of, write_outputs,
 };
-pub use plan::{PartSpec, Plan, TargetSpec, plan};
+pub use plan::{PartSpec, Plan, TargetSpec, Wishes, plan, plan_with};
 pub use reader::{parse_bytes, suggest};
 pub use skipped::{Skipped, made, skipped};
 pub use verify::{Mismatch, Verified, VerifyError, verify};

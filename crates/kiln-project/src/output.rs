@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::env_config::FORMATS;
+use crate::plan::Wishes;
 
 /// Version of the manifest's form.
 const MANIFEST_SCHEMA: u32 = 1;
@@ -102,7 +103,7 @@ pub struct Written {
 /// A target's content cannot be read from the store.
 pub fn manifest_of(engine: &Engine, targets: &Targets) -> Result<Manifest, Error> {
     let mut manifest = empty_manifest();
-    for (name, target) in targets {
+    for (name, target) in targets.iter().filter(|(name, _)| !Wishes::is_extra(name)) {
         let sha256 = target.digest();
         let files = known_files(engine, name, target, sha256)?;
         manifest.targets.insert(name.clone(), manifest_target(target, sha256, &files));

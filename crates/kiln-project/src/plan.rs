@@ -1,6 +1,6 @@
 //! From kiln.toml and the sources to a graph of actions and the targets they make.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use kiln_bake::RoughnessLaw;
 use kiln_build::{
@@ -30,6 +30,8 @@ pub struct Plan {
     pub envs: BTreeMap<String, EnvDemand>,
     /// What is wrong with kiln.toml or found while planning.
     pub diagnostics: Vec<Diagnostic>,
+    /// What was wanted besides.
+    pub wishes: Wishes,
     /// The file that an action's messages are about, where they name none themselves.
     subjects: BTreeMap<ActionId, String>,
 }
@@ -142,12 +144,42 @@ pub(crate) fn no_content(what: &str, unreadable: Option<&str>) -> Diagnostic {
     }
 }
 
+/// What somebody wants besides what the project asks for. It is in no manifest and no folder of baked files.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wishes {
+    /// Variants of material shaders that show what a pixel is made of: the targets `inspect/SHADER/VARIANT`.
+    pub inspect: bool,
+}
+
+impl Wishes {
+    /// The group of targets that [`Wishes::inspect`] is about; who wants it by this name gets it.
+    pub const INSPECT: &str = "inspect";
+
+    /// The wishes among the names of targets that somebody wants.
+    pub fn among<'a>(mut names: impl Iterator<Item = &'a String>) -> Wishes {
+        Wishes { inspect: names.any(|name| name == Wishes::INSPECT) }
+    }
+
+    /// Whether a target belongs to what is there by wish alone.
+    pub fn is_extra(target: &str) -> bool {
+        target.strip_prefix(Wishes::INSPECT).is_some_and(|rest| rest.starts_with('/'))
+    }
+}
+
 /// Plans a project: reads kiln.toml, scans scenes and shaders for what they need. `changed` names the files that may be
 /// different since this engine's last plan; `None` stands for all.
 ///
 /// # Errors
 /// The store cannot be used. Errors of the project are in [`Plan::diagnostics`].
 pub fn plan(engine: &Engine, changed: Option<&[String]>) -> Result<Plan, Error> {
+    plan_with(engine, changed, Wishes::default())
+}
+
+/// Does what [`plan`] does, for somebody with wishes of their own.
+///
+/// # Errors
+/// As [`plan`].
+pub fn plan_with(engine: &Engine, changed: Option<&[String]>, wishes: Wishes) -> Result<Plan, Error> {
     engine.begin_plan(changed);
     let mut diagnostics = Vec::new();
     let project = read_project(engine, &mut diagnostics);
@@ -155,7 +187,7 @@ pub fn plan(engine: &Engine, changed: Option<&[String]>) -> Result<Plan, Error> 
         let message = "the preview reads specular levels as linear in roughness; `law` is for engines";
         diagnostics.push(Diagnostic::note(message).in_file(PROJECT_FILE));
     }
-    plan_project(engine, project, diagnostics)
+    plan_project(engine, project, diagnostics, wishes)
 }
 
 /// Plans what a project asks for, wherever that was written.
@@ -163,6 +195,7 @@ pub(crate) fn plan_project(
     engine: &Engine,
     project: Project,
     diagnostics: Vec<Diagnostic>,
+    wishes: Wishes,
 ) -> Result<Plan, Error> {
     let mut planner = Planner { diagnostics, ..Planner::default() };
     let mut variants = shader::Variants::default();
@@ -174,7 +207,7 @@ pub(crate) fn plan_project(
     }
     let envs = env_demands(&project, &scenes);
     for (name, config) in &project.shaders {
-        shader::plan_shader(&mut planner, engine, name, config, &variants)?;
+        shader::plan_shader(&mut planner, engine, name, config, &variants, wishes)?;
     }
     for (name, config) in &project.envs {
         environment::plan_environment(&mut planner, engine, name, config, &envs[name]);
@@ -205,8 +238,21 @@ pub(crate) fn plan_project(
         meta["effects"] = json!(project.effects);
     }
     planner.target("project".to_owned(), "project", meta, Vec::new());
+    if wishes.inspect {
+        // Which shaders are looked into, so that a client knows that the others cannot be.
+        let prefix = format!("{}/", Wishes::INSPECT);
+        let name =
+            |target: &TargetSpec| Some(target.name.strip_prefix(&prefix)?.split('/').next()?.to_owned());
+        let shaders: BTreeSet<String> = planner.targets.iter().filter_map(name).collect();
+        planner.target(
+            format!("{prefix}shaders"),
+            Wishes::INSPECT,
+            json!({ "shaders": shaders }),
+            Vec::new(),
+        );
+    }
     let Planner { graph, targets, diagnostics, subjects } = planner;
-    Ok(Plan { project, graph, targets, scenes, envs, diagnostics, subjects })
+    Ok(Plan { project, graph, targets, scenes, envs, diagnostics, wishes, subjects })
 }
 
 /// Maps and tables of the preview's shaders that are not made because nothing reads them.
@@ -280,7 +326,8 @@ impl Plan {
         if has_errors(&diagnostics) {
             let published = engine.published();
             let last_good = |name: &String| Some((name.clone(), engine.last_good(name)?.into_stale()));
-            targets.extend(published.keys().filter_map(last_good));
+            let is_asked_for = |name: &&String| self.wishes.inspect || !Wishes::is_extra(name);
+            targets.extend(published.keys().filter(is_asked_for).filter_map(last_good));
         }
         for spec in &self.targets {
             if let Some(target) = resolve_target(spec, report) {

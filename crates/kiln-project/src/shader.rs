@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use crate::config::variant_name;
 use crate::environment::{command, failure, success};
-use crate::plan::{PartSpec, Planner, no_content, rank, unreadable};
+use crate::plan::{PartSpec, Planner, Wishes, no_content, rank, unreadable};
 use crate::{OwnTexture, PROJECT_FILE, Role, ShaderConfig};
 
 /// Version of the compiler behind both the scan and the action.
@@ -47,6 +47,7 @@ pub(crate) fn plan_shader(
     name: &str,
     config: &ShaderConfig,
     variants: &Variants,
+    wishes: Wishes,
 ) -> Result<(), Error> {
     let program = &config.program;
     // A scan is known by one file; what else decides what it looks at is part of its kind.
@@ -91,7 +92,19 @@ pub(crate) fn plan_shader(
         }
         let mut parts = vec![PartSpec::one(compile, "wgsl"), PartSpec::one(compile, "reflection")];
         parts.extend(textures.iter().cloned());
-        planner.target(format!("shader/{name}/{variant}"), "shader", meta, parts);
+        planner.target(format!("shader/{name}/{variant}"), "shader", meta.clone(), parts);
+        // A shader whose conditions do not know it would look the same.
+        if wishes.inspect && config.role == Role::Material && known.contains(Wishes::INSPECT) {
+            let features = asked.iter().cloned().chain([Wishes::INSPECT.to_owned()]);
+            let features: BTreeSet<String> = features.filter(|feature| known.contains(feature)).collect();
+            let compile = *compiled.entry(features).or_insert_with_key(|features| {
+                planner.graph.add(compile_action(engine, name, config, features, &scan))
+            });
+            planner.subjects.insert(compile, program.subject().to_owned());
+            let mut parts = vec![PartSpec::one(compile, "wgsl"), PartSpec::one(compile, "reflection")];
+            parts.extend(textures.iter().cloned());
+            planner.target(format!("{}/{name}/{variant}", Wishes::INSPECT), "shader", meta, parts);
+        }
     }
     Ok(())
 }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, Parser, Subcommand};
 
+mod inspect;
 mod shader;
 
 pub(crate) use shader::*;
@@ -482,6 +483,9 @@ pub(crate) struct RenderArgs {
     /// Exposure in stops
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     pub(crate) exposure: f32,
+    /// What diffuse light is read from: the baked map, or the harmonics, to see what engines show that read these
+    #[arg(long, value_enum, default_value_t = Diffuse::Map)]
+    pub(crate) diffuse: Diffuse,
     /// What is behind the scene: environment, checker, or a colour as #rrggbb (sRGB; exposure leaves it, the tone mapper does not)
     #[arg(long, default_value = "environment", value_name = "WHAT")]
     pub(crate) background: kiln_preview::Background,
@@ -503,6 +507,8 @@ pub(crate) struct RenderArgs {
     /// Lay all pictures out on one, a row for each scene under each light
     #[arg(long, value_name = "FILE.png")]
     pub(crate) sheet: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) inspect: inspect::InspectArgs,
 }
 
 /// What diffuse light is read from.

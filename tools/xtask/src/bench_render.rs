@@ -1,8 +1,10 @@
-//! `cargo xtask bench render [FRAMES]`: milliseconds a frame of real scenes, and what each of their effects costs.
+//! `cargo xtask bench render [FRAMES]`: milliseconds a frame of real scenes and of its passes, and what each of their effects
+//! costs.
 //!
 //! What an effect costs is the time that is saved when `[effects] forbid` takes it out of every variant: its code, its
 //! bindings and its passes are gone then. Scenes are drawn at 1280×720 by whatever adapter `kiln render` finds, whose name is
-//! printed; a frame ends when the device is done with it.
+//! printed; a frame ends when the device is done with it. Passes are timed by the device's own clocks, where it has some. On
+//! hardware the passes that shade must fit into 1 ms at 1920×1080.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -37,11 +39,21 @@ pub(crate) fn run(frames: usize) -> Result<(), String> {
         let below = file.strip_prefix(Path::new(&corpus)).unwrap_or(&file).display().to_string();
         write_project(&project, &below, None)?;
         let effects = effects(&bench, &project)?;
-        let whole = frame_ms(&bench, &project, frames, &mut adapter)?;
+        let whole = frame_ms(&bench, &project, frames, "1280x720", &mut adapter)?;
         println!("\n{name}, 1280x720, studio: {:.1} ms a frame (best {:.1})", whole.median, whole.best);
+        for (pass, ms) in &whole.passes {
+            println!("  pass {pass:<25} {ms:>7.1} ms");
+        }
+        if !is_software(&adapter) {
+            let hd = frame_ms(&bench, &project, frames, "1920x1080", &mut adapter)?;
+            let shading = hd.passes.iter().filter(|(pass, _)| SHADING.contains(&pass.as_str()));
+            let shading: f64 = shading.map(|(_, ms)| ms).sum();
+            let verdict = if shading <= BUDGET_MS { "within" } else { "OVER" };
+            println!("  shading at 1920x1080 {shading:>14.2} ms   {verdict} the budget of {BUDGET_MS} ms");
+        }
         for effect in effects {
             write_project(&project, &below, Some(&effect))?;
-            let without = frame_ms(&bench, &project, frames, &mut adapter)?;
+            let without = frame_ms(&bench, &project, frames, "1280x720", &mut adapter)?;
             println!(
                 "  without {effect:<22} {:>7.1} ms   it costs {:>6.1} ms",
                 without.median,
@@ -91,14 +103,37 @@ fn effects(bench: &Bench, project: &Path) -> Result<BTreeSet<String>, String> {
     Ok(named.map(str::to_owned).collect())
 }
 
+/// Passes that shade materials.
+const SHADING: [&str; 3] = ["scene", "opaque", "transmissive and blended"];
+/// What they may take together on hardware.
+const BUDGET_MS: f64 = 1.0;
+
+/// Whether an adapter draws on the CPU, by its description.
+fn is_software(adapter: &str) -> bool {
+    ["llvmpipe", "SwiftShader", "WARP"].iter().any(|name| adapter.contains(name))
+}
+
 struct Times {
     median: f64,
     best: f64,
+    /// Medians of each pass, in order.
+    passes: Vec<(String, f64)>,
 }
 
-fn frame_ms(bench: &Bench, project: &Path, frames: usize, adapter: &mut String) -> Result<Times, String> {
+fn median(times: &mut [f64]) -> Option<f64> {
+    times.sort_by(f64::total_cmp);
+    times.get(times.len() / 2).copied()
+}
+
+fn frame_ms(
+    bench: &Bench,
+    project: &Path,
+    frames: usize,
+    size: &str,
+    adapter: &mut String,
+) -> Result<Times, String> {
     let mut command = bench.kiln("cache");
-    command.args(["render", "--json", "--size", "1280x720", "--frames", &(frames + 1).to_string(), "--out"]);
+    command.args(["render", "--json", "--size", size, "--frames", &(frames + 1).to_string(), "--out"]);
     let report = output_of(command.arg(bench.folder.join("frames")).arg(project))?;
     let value = |line: &str, key: &str| {
         let rest = line.trim().strip_prefix(&format!("\"{key}\": "))?;
@@ -110,7 +145,22 @@ fn frame_ms(bench: &Bench, project: &Path, frames: usize, adapter: &mut String) 
     // The first frame makes the driver compile.
     let times = report.lines().filter_map(|line| value(line, "draw_ms")?.parse::<f64>().ok()).skip(1);
     let mut times: Vec<f64> = times.collect();
-    times.sort_by(f64::total_cmp);
-    let median = times.get(times.len() / 2).copied().ok_or("kiln render drew nothing")?;
-    Ok(Times { median, best: times[0] })
+    let middle = median(&mut times).ok_or("kiln render drew nothing")?;
+    let mut passes: Vec<(String, Vec<f64>)> = Vec::new();
+    let (mut frame, mut pass) = (0, String::new());
+    for line in report.lines() {
+        frame += usize::from(value(line, "draw_ms").is_some());
+        if let Some(name) = value(line, "pass") {
+            pass = name;
+        }
+        let Some(ms) = value(line, "ms").and_then(|ms| ms.parse().ok()).filter(|_| frame > 1) else {
+            continue;
+        };
+        match passes.iter_mut().find(|(name, _)| *name == pass) {
+            Some((_, times)) => times.push(ms),
+            None => passes.push((pass.clone(), vec![ms])),
+        }
+    }
+    let passes = passes.into_iter().filter_map(|(pass, mut times)| Some((pass, median(&mut times)?)));
+    Ok(Times { median: middle, best: times[0], passes: passes.collect() })
 }

@@ -184,3 +184,57 @@ fn folder_in_place_of_a_source_is_an_error_until_the_file_is_back() {
     }
     assert_ne!(digests(&broken), digests(&mended), "the last good content was of the first panorama");
 }
+
+/// A triangle in a shader that knows the feature `inspect`.
+fn with_scene(folder: &Path) {
+    plain(folder);
+    let write = |name: &str, text: &str| fs::write(folder.join("project").join(name), text).unwrap();
+    write(
+        "kiln.toml",
+        "version = 1\n[env.sky]\nsource = \"sky.hdr\"\nsize = 64\n[scene.quad]\nsource = \"quad.gltf\"\nenv = \"sky\"\n\
+         shader = \"flat\"\n[shader.flat]\nsource = \"flat.wgsl\"\n",
+    );
+    write(
+        "flat.wgsl",
+        "@vertex fn vs_main() -> @builtin(position) vec4f { return vec4f(0.0); }
+@fragment fn fs_main() -> @location(0) vec4f {
+    @if(inspect) return vec4f(0.5);
+    @else return vec4f(1.0);
+}",
+    );
+    write(
+        "quad.gltf",
+        r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}],
+"bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"uri":"quad.bin","byteLength":36}]}"#,
+    );
+    let corners: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    fs::write(folder.join("project/quad.bin"), corners.map(f32::to_le_bytes).as_flattened()).unwrap();
+}
+
+#[test]
+fn shaders_that_show_channels_come_when_a_client_wants_them_and_go_with_it() {
+    let daemon = Running::start(None, with_scene);
+    let inspected = |table: &RevisionTable| table.targets.contains_key("inspect/flat/base");
+    let first = kiln_link::Client::connect(daemon.socket.clone(), "looks");
+    first.want(vec!["scene/quad".to_owned(), "inspect".to_owned()]);
+    assert!(inspected(&daemon.published()));
+    let second = kiln_link::Client::connect(daemon.socket.clone(), "looks too");
+    second.want(vec!["inspect".to_owned()]);
+    let begun = std::time::Instant::now();
+    let is_heard = || {
+        let clients = kiln_link::status(&daemon.socket, LIMIT).unwrap().clients;
+        clients.iter().any(|client| client.name == "looks too" && client.wants == ["inspect"])
+    };
+    while !is_heard() {
+        assert!(begun.elapsed() < LIMIT, "the second client is not heard");
+    }
+    first.want(vec!["scene/quad".to_owned()]);
+    // As long as one client wants them they stay: the next revision is that of the last one's leaving.
+    drop(second);
+    let table = daemon.published();
+    assert!(!inspected(&table), "nobody wants them");
+    assert_eq!(table.number, 3);
+    drop(first);
+}

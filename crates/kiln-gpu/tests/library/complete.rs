@@ -5,11 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::support::repository;
 
 /// Read textures or derivatives, and are seen in the golden frames instead.
-const SEEN_IN_FRAMES: [&str; 8] = [
+const SEEN_IN_FRAMES: [&str; 9] = [
     "alpha2_filtered",
     "environment_direction",
     "ggx_scale_bias",
     "irradiance_over_pi",
+    "mip_level",
     "sheen_albedo",
     "sheen_radiance",
     "skybox_radiance",

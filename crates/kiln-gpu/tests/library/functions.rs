@@ -331,3 +331,29 @@ fn albedo(a: Arguments) -> [f64; 4] {
     let average = a[0] + (a[1] - a[0]) / 21.0;
     [single, single * average * missing / (1.0 - average * missing).max(1e-3), 0.0, 0.0]
 }
+
+#[test]
+fn faults_of_radiance_are_told_apart() {
+    let values =
+        [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, -0.0, 0.0, 1e-30, 99.0, 100.0, 101.0, 3e38];
+    check_all(&[Comparison {
+        function: "lib::inspect::faults",
+        call: "faults(a.xyz, a.w)",
+        arguments: grid(&[&values, &[0.5, f32::NAN], &[0.5, f32::INFINITY], &[100.0]]),
+        truth: |a| {
+            let any = |is_so: &dyn Fn(f64) -> bool| f64::from(u8::from(a[..3].iter().any(|x| is_so(*x))));
+            [
+                any(&|x| x.is_nan()),
+                any(&|x| x.is_infinite()),
+                any(&|x| x < 0.0),
+                any(&|x| x.is_finite() && x > a[3]),
+            ]
+        },
+        wrong: |a| {
+            let any = |is_so: &dyn Fn(f64) -> bool| f64::from(u8::from(a[..3].iter().any(|x| is_so(*x))));
+            [any(&|x| x.is_nan()), any(&|x| x.is_infinite()), any(&|x| x < 0.0), any(&|x| x > a[3])]
+        },
+        tolerance: 0.0,
+        least: 1.0,
+    }]);
+}

@@ -4,12 +4,15 @@ use egui::{CentralPanel, Panel, Ui};
 use kiln_diagnostic::Diagnostic;
 use kiln_link::{RevisionTable, Work};
 
+pub(crate) use self::inspect::Findings;
 use self::scene::Playback;
 use crate::report::ApplyReport;
 use crate::theme;
 use crate::view::{Selection, View};
 
 mod diagnostics;
+mod inspect;
+mod materials;
 mod parameters;
 mod scene;
 mod side;
@@ -60,6 +63,7 @@ pub(crate) struct PanelState {
     /// How the user wants to see it.
     pub view: View,
     pub playback: Playback,
+    pub findings: Findings,
 }
 
 impl PanelState {
@@ -78,6 +82,7 @@ impl PanelState {
             selection,
             view,
             playback: Playback::default(),
+            findings: Findings::default(),
         }
     }
 

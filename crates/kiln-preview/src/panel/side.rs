@@ -31,6 +31,10 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState) {
         section(ui, "Camera");
         super::scene::show_cameras(ui, state);
         show_camera(ui, &mut state.view);
+        super::inspect::show(ui, state);
+        super::inspect::show_probe(ui, state.findings.probe.as_ref());
+        super::inspect::show_times(ui, &state.findings);
+        super::materials::show(ui, state);
         show_notes(ui, state);
         ui.add_space(12.0);
         ui.label(RichText::new(&state.adapter).small().color(theme::WEAK));

@@ -90,6 +90,20 @@ impl Build {
         })
     }
 
+    /// `pbr` with each of the feature sets as the variants that show channels.
+    pub fn inspect_shaders(&mut self, feature_sets: &[&[&str]]) -> &mut Self {
+        for features in feature_sets {
+            let variant = if features.is_empty() { "base".to_owned() } else { features.join("+") };
+            let mut compiled = Build::new();
+            compiled.shader("pbr", "material", "pbr/pbr.wgsl", &[features, &["inspect"][..]].concat());
+            let (_, mut target) = compiled.table.targets.pop_first().expect("it was compiled");
+            target.meta["features"] = json!(features);
+            self.blobs.extend(compiled.blobs);
+            self.table.targets.insert(format!("inspect/pbr/{variant}"), target);
+        }
+        self.target("inspect/shaders", "inspect", json!({ "shaders": ["pbr"] }), &[])
+    }
+
     /// Compiles one module that imports nothing.
     pub fn shader_text(&mut self, name: &str, role: &str, text: &str) -> &mut Self {
         self.shader_from(name, role, "test.wgsl", &[], &mut |path| {

@@ -8,6 +8,8 @@ mod faults;
 mod fixture;
 mod frames;
 mod harmonics;
+mod inspect;
+mod inspect_panels;
 mod lights;
 mod panels;
 mod parameters;

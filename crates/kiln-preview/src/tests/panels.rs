@@ -10,7 +10,7 @@ use crate::panel::{self, Connection, PanelState};
 use crate::theme;
 use crate::{AnimationTime, Background, Ground, OfferedAnimation, OfferedParameter, Selection, View};
 
-fn state() -> PanelState {
+pub(super) fn state() -> PanelState {
     let mut state = PanelState::new("llvmpipe, Vulkan".to_owned(), Selection::default(), View::default());
     state.connection = Connection::Connected;
     state.project = "demo".to_owned();
@@ -22,7 +22,7 @@ fn state() -> PanelState {
     state
 }
 
-fn harness(state: PanelState) -> Harness<'static, PanelState> {
+pub(super) fn harness(state: PanelState) -> Harness<'static, PanelState> {
     let show = |ui: &mut egui::Ui, state: &mut PanelState| {
         theme::apply(ui.ctx());
         panel::show(ui, state, |_, _| ());

@@ -13,6 +13,7 @@ mod edits;
 mod effects;
 mod outputs;
 mod outside;
+mod wishes;
 
 const TOML: &str = r#"version = 1
 [project]

@@ -10,7 +10,11 @@ use kiln_diagnostic::{Diagnostic, has_errors};
 use kiln_gpu::Gpu;
 use kiln_image::sheet::{Shot, shot_sheet};
 use kiln_link::Revision;
-use kiln_preview::{AnimationTime, ApplyReport, Assignment, DiffuseSource, HeadlessViewer, Selection};
+use kiln_preview::{
+    AnimationTime, ApplyReport, Assignment, Channel, DiffuseSource, FaultCounts, HeadlessViewer, PassTime,
+    PixelProbe, Selection,
+};
+use kiln_project::Wishes;
 use kiln_shader::Widget;
 use serde::Serialize;
 
@@ -47,7 +51,8 @@ fn build(args: &RenderArgs) -> anyhow::Result<Revision> {
     let progress = show_progress(&bar);
     let cancel = AtomicBool::new(false);
     let options = place::run_options(&args.build, true, &cancel, &progress);
-    let built = kiln_project::build(&engine, None, &options);
+    let wishes = Wishes { inspect: !args.inspect.channel.is_empty() || args.inspect.mark_faults.is_some() };
+    let built = kiln_project::build_with(&engine, None, wishes, &options);
     bar.finish_and_clear();
     let built = built.context("building")?.context("the build was cancelled")?;
     engine.save_memory().context("remembering the build")?;
@@ -83,6 +88,14 @@ struct Drawn {
     frame: usize,
     /// Without reading it back.
     draw_ms: f64,
+    /// What is shown in place of the picture.
+    channel: Option<Channel>,
+    /// Of each pass on the device; empty where it has no clocks.
+    pass_ms: Vec<PassTime>,
+    /// What `--probe` asked for.
+    probe: Option<PixelProbe>,
+    /// What `--mark-faults` counted.
+    faults: Option<FaultCounts>,
 }
 
 /// Everything about one run.
@@ -111,6 +124,7 @@ impl<'a> Session<'a> {
             .with_context(|| format!("making the folder {}", args.out.display()))?;
         viewer.view.exposure_ev = args.exposure;
         (viewer.view.background, viewer.view.ground) = (args.background, args.ground);
+        viewer.view.fault_limit = args.inspect.mark_faults;
         let offered = viewer.apply(revision);
         let diagnostics = revision.table.diagnostics.clone();
         Ok(Session { args, viewer, offered, drawn: vec![], shots: vec![], notes: vec![], diagnostics })
@@ -150,14 +164,30 @@ impl<'a> Session<'a> {
             Some(asked) => Some(AnimationTime { index: animation(asked, &applied)?, time_s: self.args.time }),
             None => None,
         };
+        if self.args.inspect.channel.is_empty() {
+            return self.draw_choices(&applied);
+        }
+        for &channel in &self.args.inspect.channel {
+            if let Some(reason) = applied.inspection.refusal(channel) {
+                return Err(
+                    place::WrongInput(format!("channel `{channel}` cannot be shown: {reason}")).into()
+                );
+            }
+            self.viewer.view.channel = Some(channel);
+            self.draw_choices(&applied)?;
+        }
+        Ok(())
+    }
+
+    fn draw_choices(&mut self, applied: &ApplyReport) -> anyhow::Result<()> {
         match &self.args.vary {
-            None => self.draw_frames(&applied, None),
+            None => self.draw_frames(applied, None),
             Some(name) => {
-                for choice in choices(name, &applied)? {
+                for choice in choices(name, applied)? {
                     let text = format!("{name}={choice}");
                     let assignment: Assignment = text.parse().map_err(place::WrongInput)?;
                     self.viewer.assign(&[assignment]).map_err(|it| place::WrongInput(it.to_string()))?;
-                    self.draw_frames(&applied, Some(&choice))?;
+                    self.draw_frames(applied, Some(&choice))?;
                 }
                 Ok(())
             }
@@ -187,9 +217,19 @@ impl<'a> Session<'a> {
         let start = Instant::now();
         self.viewer.draw().context("drawing a frame")?;
         let draw_ms = start.elapsed().as_secs_f64() * 1e3;
+        let pass_ms = self.viewer.take_pass_times().unwrap_or_default();
+        let faults = match self.args.inspect.mark_faults {
+            Some(_) => self.viewer.count_faults().context("counting faults")?,
+            None => None,
+        };
+        let probe = match self.args.inspect.probe {
+            Some(pixel) => Some(self.probe(pixel)?),
+            None => None,
+        };
         let picture = self.viewer.render().context("reading a frame")?;
+        let channel = self.viewer.view.channel;
         let shown = &applied.shown;
-        let words = [shown.scene.as_deref(), shown.env.as_deref(), choice];
+        let words = [shown.scene.as_deref(), shown.env.as_deref(), choice, channel.map(Channel::name)];
         let title = words.into_iter().flatten().collect::<Vec<_>>();
         let number = if self.args.frames > 1 { format!("_{frame:04}") } else { String::new() };
         let stem = format!("{}{number}", title.join("-").replace(['/', '\\'], "-"));
@@ -208,8 +248,20 @@ impl<'a> Session<'a> {
         }
         let (scene, env) = (shown.scene.clone(), shown.env.clone());
         let choice = choice.map(str::to_owned);
-        self.drawn.push(Drawn { file, scene, env, choice, frame, draw_ms });
+        self.drawn.push(Drawn { file, scene, env, choice, frame, draw_ms, channel, pass_ms, probe, faults });
         Ok(())
+    }
+
+    fn probe(&mut self, pixel: [u32; 2]) -> anyhow::Result<PixelProbe> {
+        let outside = || {
+            let [width, height] = self.args.size;
+            let [x, y] = pixel;
+            place::WrongInput(format!(
+                "the pixel {x},{y} is outside of the picture of {width}x{height} pixels"
+            ))
+        };
+        let probe = self.viewer.probe(pixel).context("reading a pixel")?;
+        Ok(probe.ok_or_else(outside)?)
     }
 
     fn finish(self, revision: &Revision) -> anyhow::Result<ExitCode> {
@@ -238,6 +290,14 @@ impl<'a> Session<'a> {
             say!("{} on {}", report::revision_line(&revision.table), facts.adapter);
             for drawn in facts.pictures {
                 say!("{}  ({})", drawn.file.display(), report::duration(drawn.draw_ms));
+                if let Some(probe) = &drawn.probe {
+                    say!("  {}", serde_json::to_string(probe)?);
+                }
+                if let Some(FaultCounts { nan, infinite, negative, over_range }) = drawn.faults {
+                    say!(
+                        "  pixels: {nan} NaN, {infinite} infinite, {negative} negative, {over_range} over range"
+                    );
+                }
             }
             if let Some(sheet) = facts.sheet {
                 say!("{}", sheet.display());

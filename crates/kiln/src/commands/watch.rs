@@ -89,6 +89,8 @@ impl Screen {
             ServerEvent::Connected { client, name } => say!("client {client} ({name}) connected"),
             ServerEvent::Gone { client, reason } => say!("client {client} left: {reason}"),
             ServerEvent::StopAsked => say!("asked to end"),
+            // What follows of it is told.
+            ServerEvent::Wants { .. } => {}
             ServerEvent::Frame { client, report } => {
                 let since =
                     if self.noticed_unix_ms > 0.0 { self.noticed_unix_ms } else { self.published_unix_ms };
@@ -127,6 +129,7 @@ fn to_json(notice: &Notice) -> serde_json::Value {
         Notice::Client(ServerEvent::Frame { client, report }) => {
             json!({"event": "frame", "client": client, "report": report})
         }
+        Notice::Client(ServerEvent::Wants { client }) => json!({"event": "client wants", "client": client}),
         Notice::Client(ServerEvent::StopAsked) => json!({"event": "stop asked"}),
     }
 }
