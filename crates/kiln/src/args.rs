@@ -401,9 +401,12 @@ pub(crate) struct PreviewArgs {
     /// Go on: write revision_0001.png … for every revision until ended, through daemons that come and go
     #[arg(long, requires = "headless", conflicts_with_all = ["frames", "turn", "json", "param"])]
     pub(crate) follow: bool,
-    /// Folder for frame_0001.png … and report.json
-    #[arg(long, default_value = "frames", requires = "headless")]
-    pub(crate) out: PathBuf,
+    /// Folder for pictures: frame_0001.png … and report.json, or the window's screenshots [default: frames; of a window the one in the project]
+    #[arg(long)]
+    pub(crate) out: Option<PathBuf>,
+    /// Do not remember how the window was, and open it as at first
+    #[arg(long, conflicts_with = "headless")]
+    pub(crate) fresh: bool,
     /// Picture size in pixels
     #[arg(long, default_value = "1280x720", value_parser = parse_size, requires = "headless")]
     pub(crate) size: [u32; 2],
@@ -425,9 +428,6 @@ pub(crate) struct PreviewArgs {
     /// Exposure in stops
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     pub(crate) exposure: f32,
-    /// What diffuse light is read from: the baked map, or the harmonics, to see what engines show that read these
-    #[arg(long, value_enum, default_value_t = Diffuse::Map)]
-    pub(crate) diffuse: Diffuse,
     /// Set a parameter that a shader's author offers: wetness=0.5, tonemap.tint=1,0.9,0.8, is_lit=false, mode=smooth
     #[arg(long, value_name = "[SHADER.]NAME=VALUE", requires = "headless")]
     pub(crate) param: Vec<kiln_preview::Assignment>,
@@ -470,9 +470,9 @@ pub(crate) struct RenderArgs {
     /// Frames a second of the animation
     #[arg(long, default_value_t = 30.0, requires = "animation", value_parser = parse_rate)]
     pub(crate) fps: f64,
-    /// Picture size in pixels
-    #[arg(long, default_value = "1280x720", value_parser = parse_size)]
-    pub(crate) size: [u32; 2],
+    /// Picture size in pixels [default: 1280x720, or that of `--look`]
+    #[arg(long, value_parser = parse_size)]
+    pub(crate) size: Option<[u32; 2]>,
     /// Number of frames of each
     #[arg(long, default_value_t = 1)]
     pub(crate) frames: usize,
@@ -488,6 +488,9 @@ pub(crate) struct RenderArgs {
     /// What is below the scene: none, grid, shadow (that of the extracted sun) or grid+shadow
     #[arg(long, default_value = "none", value_name = "WHAT")]
     pub(crate) ground: kiln_preview::Ground,
+    /// What diffuse light is read from: the baked map, or the harmonics, to see what engines show that read these
+    #[arg(long, value_enum, default_value_t = Diffuse::Map)]
+    pub(crate) diffuse: Diffuse,
     /// Set a parameter that a shader's author offers: wetness=0.5, tonemap.tint=1,0.9,0.8, tone_mapper=agx
     #[arg(long, value_name = "[SHADER.]NAME=VALUE")]
     pub(crate) param: Vec<kiln_preview::Assignment>,
@@ -500,6 +503,13 @@ pub(crate) struct RenderArgs {
     /// Write the radiance before exposure and tone mapping besides, as OpenEXR
     #[arg(long)]
     pub(crate) exr: bool,
+    /// Draw what a parameter sheet says, which the window saves beside a screenshot
+    #[arg(
+        long,
+        value_name = "SHEET.json",
+        conflicts_with_all = ["scene", "env", "camera", "material_variant", "animation", "exposure", "vary", "diffuse", "background", "ground"]
+    )]
+    pub(crate) look: Option<PathBuf>,
     /// Lay all pictures out on one, a row for each scene under each light
     #[arg(long, value_name = "FILE.png")]
     pub(crate) sheet: Option<PathBuf>,
