@@ -55,7 +55,10 @@ impl Project {
                 argument => command.arg(argument),
             };
         }
-        command.env("KILN_CACHE", self.beside("cache")).env("XDG_RUNTIME_DIR", self.beside("runtime"));
+        command
+            .env("KILN_CACHE", self.beside("cache"))
+            .env("XDG_RUNTIME_DIR", self.beside("runtime"))
+            .env("XDG_STATE_HOME", self.beside("state"));
         command.stdin(Stdio::null());
         command
     }

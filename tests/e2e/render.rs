@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Output;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::harness::{Project, kiln, skip, text};
 
@@ -140,4 +140,38 @@ fn diff_refuses_what_it_cannot_compare() {
         assert_eq!(output.status.code(), Some(1), "{said}");
         assert!(said.contains(expected), "{said}");
     }
+}
+
+#[test]
+fn parameter_sheet_is_drawn_and_what_it_names_must_be_there() {
+    let project = Project::sample();
+    let out = project.beside("frames");
+    let sheet = project.beside("sheet.json");
+    let write = |env: &str| {
+        let look = json!({ "selection": { "env": env }, "view": { "exposure_ev": 1.0 } });
+        std::fs::write(&sheet, json!({ "kiln_look": 1, "size": [80, 45], "look": look }).to_string())
+            .unwrap();
+    };
+    write("studio");
+    let render =
+        |more: &[&str]| project.command(&["render", "DIR", "--look"]).arg(&sheet).args(more).output();
+    let output = render(&["--out", out.to_str().unwrap()]).unwrap();
+    if text(&output.stderr).contains("mesa-vulkan-drivers") {
+        return skip("rendering", "there is no graphics device");
+    }
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let drawn = image::open(out.join("balls-studio.png")).unwrap().to_rgb8();
+    assert_eq!(drawn.dimensions(), (80, 45));
+    let other = project.beside("other");
+    let same = ["render", "DIR", "--env", "studio", "--exposure", "1", "--size", "80x45", "--out"];
+    assert!(project.command(&same).arg(&other).status().unwrap().success());
+    assert!(drawn == image::open(other.join("balls-studio.png")).unwrap().to_rgb8());
+    write("moon");
+    let output = render(&[]).unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stderr).contains("the environment `moon`"), "{}", text(&output.stderr));
+    std::fs::write(&sheet, "{}").unwrap();
+    let output = render(&[]).unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stderr).contains("no parameter sheet"), "{}", text(&output.stderr));
 }

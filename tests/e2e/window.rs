@@ -3,7 +3,7 @@
 use std::io::{BufRead as _, BufReader};
 use std::process::{Command, Stdio};
 
-use crate::harness::{Process, Project, skip};
+use crate::harness::{LIMIT, Process, Project, skip};
 
 /// A virtual display of its own number.
 struct Display {
@@ -42,4 +42,46 @@ fn window_shows_revisions_and_outlives_the_daemon() {
     assert_eq!(watch.wait_for("client connected")["name"], "preview, window");
     assert_eq!(watch.wait_for("frame")["report"]["revision"], 1);
     assert!(window.0.try_wait().unwrap().is_none(), "the window must still be open");
+}
+
+#[test]
+fn window_remembers_how_it_was_and_headless_runs_do_not() {
+    let Some(display) = Display::open() else { return skip("window", "Xvfb is not installed") };
+    let project = Project::sample();
+    let watch = project.watch();
+    watch.published();
+    let shown = project.beside("shown");
+    let mut headless = project.command(&["preview", "DIR", "--headless", "--size", "32x32", "--out"]);
+    assert!(headless.arg(&shown).status().unwrap().success());
+    let folder = project.beside("state/kiln/windows");
+    assert!(!folder.exists(), "a headless run has no window to remember");
+    let open = |more: &[&str]| {
+        let mut command = project.command(&["preview", "DIR"]);
+        command.args(more).env("DISPLAY", &display.name).env_remove("WAYLAND_DISPLAY");
+        Process(command.spawn().unwrap())
+    };
+    let window = open(&["--env", "studio", "--exposure", "1.5"]);
+    let saved = written_into(&folder);
+    assert_eq!(saved["look"]["selection"]["env"], "studio", "{saved}");
+    assert_eq!(saved["look"]["view"]["exposure_ev"], 1.5, "{saved}");
+    drop(window);
+    std::fs::remove_dir_all(&folder).unwrap();
+    let window = open(&["--fresh"]);
+    assert_eq!(watch.wait_for("frame")["report"]["revision"], 1);
+    drop(window);
+    assert!(!folder.exists(), "--fresh writes nothing");
+}
+
+/// The JSON file that appears in `folder`.
+fn written_into(folder: &std::path::Path) -> serde_json::Value {
+    let deadline = std::time::Instant::now() + LIMIT;
+    while std::time::Instant::now() < deadline {
+        let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
+        let mut json = files.filter(|file| file.path().extension().is_some_and(|ending| ending == "json"));
+        if let Some(file) = json.next() {
+            return serde_json::from_slice(&std::fs::read(file.path()).unwrap()).unwrap();
+        }
+        std::thread::yield_now();
+    }
+    panic!("nothing was written into {}", folder.display());
 }

@@ -5,6 +5,7 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 use glam::camera::rh::proj::directx::{orthographic, perspective};
 use glam::{Mat3, Mat4, Vec3};
 use kiln_scene::{Bounds, Camera, Scene};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// Vertical field of view where no camera of the file says another: a short telephoto, as for products.
 const FIELD_OF_VIEW_RAD: f32 = 35.0 * PI / 180.0;
@@ -12,13 +13,16 @@ const FIELD_OF_VIEW_RAD: f32 = 35.0 * PI / 180.0;
 const PITCH_MAX_RAD: f32 = FRAC_PI_2 - 0.01;
 /// How much farther than the target's distance the eye of parallel rays is for shaders: to them a scene is 1e-4 rad wide.
 const ORTHOGRAPHIC_DISTANCE: f32 = 1e4;
+/// How near and how far the hand may bring it.
+const DISTANCES: (f32, f32) = (1e-5, 1e7);
 /// Room left around the scene, as a factor of the distance at which it just fits.
 const FRAME_MARGIN: f32 = 1.06;
 
 /// Looks at a point from a direction and a distance; +Y is up.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OrbitCamera {
     /// What it looks at.
+    #[serde(serialize_with = "write_point", deserialize_with = "read_point")]
     pub target: Vec3,
     /// From the target to the eye, above 0.
     pub distance: f32,
@@ -29,8 +33,10 @@ pub struct OrbitCamera {
     /// Vertical field of view.
     pub field_of_view_rad: f32,
     /// Turns the picture clockwise about its middle.
+    #[serde(default)]
     pub roll_rad: f32,
     /// Whether rays are parallel; it sees as much as the field of view does at the target.
+    #[serde(default)]
     pub is_orthographic: bool,
 }
 
@@ -104,6 +110,37 @@ impl OrbitCamera {
         };
         camera.distance = camera.fitting_distance(bounds, aspect).max(1e-4) * FRAME_MARGIN;
         camera
+    }
+
+    /// The same direction and field of view, so far away that all of `bounds` is just inside the picture.
+    #[must_use]
+    pub fn framed(mut self, bounds: Bounds, aspect: f32) -> Self {
+        self.target = center(bounds);
+        self.distance =
+            (self.fitting_distance(bounds, aspect) * FRAME_MARGIN).clamp(DISTANCES.0, DISTANCES.1);
+        self
+    }
+
+    /// A world ray through a place of the picture, 0 to 1 from its top left: origin, direction of any length.
+    pub(crate) fn ray(&self, place: [f32; 2], aspect: f32) -> (Vec3, Vec3) {
+        let half_height = (self.field_of_view_rad / 2.0).tan();
+        let (right, up, back) = self.axes();
+        let x = (2.0 * place[0] - 1.0) * half_height * aspect;
+        let y = (1.0 - 2.0 * place[1]) * half_height;
+        if self.is_orthographic {
+            return (self.position() + (right * x + up * y) * self.distance, -back);
+        }
+        (self.position(), right * x + up * y - back)
+    }
+
+    /// Whether it can be looked through: what a file says need not be.
+    pub(crate) fn is_usable(&self) -> bool {
+        let numbers = [self.distance, self.yaw_rad, self.pitch_rad, self.field_of_view_rad, self.roll_rad];
+        self.target.is_finite()
+            && numbers.iter().all(|number| number.is_finite())
+            && (DISTANCES.0..=DISTANCES.1).contains(&self.distance)
+            && self.pitch_rad.abs() <= FRAC_PI_2 + 1e-3
+            && (1e-3..3.1).contains(&self.field_of_view_rad)
     }
 
     /// The distance at which every corner of the box is just inside the picture.
@@ -186,8 +223,16 @@ impl OrbitCamera {
 
     /// Multiplies the distance.
     pub fn dolly(&mut self, factor: f32) {
-        self.distance = (self.distance * factor).clamp(1e-5, 1e7);
+        self.distance = (self.distance * factor).clamp(DISTANCES.0, DISTANCES.1);
     }
+}
+
+fn write_point<S: Serializer>(point: &Vec3, to: S) -> Result<S::Ok, S::Error> {
+    point.to_array().serialize(to)
+}
+
+fn read_point<'de, D: Deserializer<'de>>(from: D) -> Result<Vec3, D::Error> {
+    <[f32; 3]>::deserialize(from).map(Vec3::from)
 }
 
 fn center(bounds: Bounds) -> Vec3 {

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use kiln_scene::Effect;
 
 /// A value of the material or a part of its light. The order is that of `shaders/lib/inspect.wgsl`, which begins with 1.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Channel {
     /// Base colour with its texture and vertex colours.

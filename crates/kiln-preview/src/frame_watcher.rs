@@ -19,32 +19,37 @@ pub(crate) struct Watched {
     pub noticed_unix_ms: f64,
 }
 
+/// A frame that the device has finished.
+pub(crate) struct Finished {
+    pub report: FrameReport,
+    /// From noticing the change; `None` where there was none.
+    pub latency_ms: Option<f64>,
+}
+
 /// Waits for frames on its own thread and reports when the device was done with them.
 pub(crate) struct FrameWatcher {
     frames: Sender<Watched>,
-    latencies_ms: Receiver<f64>,
+    finished: Receiver<Finished>,
 }
 
 impl FrameWatcher {
-    /// Starts the thread; `wake` is called whenever [`FrameWatcher::latency_ms`] has something new.
+    /// Starts the thread; `wake` is called whenever [`FrameWatcher::finished`] has something new.
     pub fn spawn(reports: Sender<FrameReport>, wake: impl Fn() + Send + 'static) -> anyhow::Result<Self> {
         let (frames, watched) = channel::<Watched>();
-        let (sender, latencies_ms) = channel();
+        let (sender, finished) = channel();
         let thread = std::thread::Builder::new().name("frames".into());
         let watch = move || {
             for frame in watched {
-                let (report, latency_ms) = await_frame(frame);
+                let frame = await_frame(frame);
                 // Both ends belong to the window: when they are gone, so is the need.
-                if reports.send(report).is_err()
-                    || latency_ms.is_some_and(|latency_ms| sender.send(latency_ms).is_err())
-                {
+                if reports.send(frame.report.clone()).is_err() || sender.send(frame).is_err() {
                     return;
                 }
                 wake();
             }
         };
         thread.spawn(watch).context("starting a thread")?;
-        Ok(FrameWatcher { frames, latencies_ms })
+        Ok(FrameWatcher { frames, finished })
     }
 
     /// Waits for `frame`.
@@ -53,18 +58,19 @@ impl FrameWatcher {
         drop(self.frames.send(frame));
     }
 
-    /// From noticing the change to the end of the newest frame that was waited for, once.
-    pub fn latency_ms(&self) -> Option<f64> {
-        self.latencies_ms.try_iter().last()
+    /// The frames that were waited for, each once.
+    pub fn finished(&self) -> impl Iterator<Item = Finished> {
+        self.finished.try_iter()
     }
 }
 
-fn await_frame(frame: Watched) -> (FrameReport, Option<f64>) {
+fn await_frame(frame: Watched) -> Finished {
     // A lost device shows in the panel; its frame counts as drawn now.
     frame.submitted.wait(FRAME_TIMEOUT);
     let drawn_unix_ms = unix_ms();
     let Ready { prepared, received_unix_ms, ready_unix_ms } = frame.ready;
     let revision = prepared.report.revision;
     let latency_ms = (frame.noticed_unix_ms > 0.0).then_some(drawn_unix_ms - frame.noticed_unix_ms);
-    (FrameReport { revision, received_unix_ms, ready_unix_ms, drawn_unix_ms }, latency_ms)
+    let report = FrameReport { revision, received_unix_ms, ready_unix_ms, drawn_unix_ms };
+    Finished { report, latency_ms }
 }

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use half::f16;
 use image::RgbaImage;
 use kiln_gpu::{Gpu, GpuError};
 use kiln_image::Image;
@@ -13,6 +12,7 @@ use crate::faults::FaultCounts;
 use crate::pass_timer::PassTime;
 use crate::prepare::Preparer;
 use crate::probe::PixelProbe;
+use crate::readout::read_radiance;
 use crate::renderer::Renderer;
 use crate::report::ApplyReport;
 use crate::view::{Selection, View};
@@ -114,13 +114,7 @@ impl HeadlessViewer {
     /// [`GpuError::Readback`] when the device is lost.
     pub fn render_radiance(&mut self) -> Result<Image, GpuError> {
         self.renderer.render(&self.view);
-        let radiance = self.renderer.radiance();
-        let size = [radiance.width(), radiance.height()].map(|pixels| pixels as usize);
-        let bytes = self.gpu.read_texture(radiance, 0)?;
-        let channel = |half: &[u8]| f16::from_le_bytes([half[0], half[1]]).to_f32();
-        let rgb = bytes.chunks_exact(8).flat_map(|texel| texel[..6].chunks_exact(2).map(channel)).collect();
-        let incomplete = |_| GpuError::Readback { reason: "the picture is incomplete".to_owned() };
-        Image::new(size[0], size[1], rgb).map_err(incomplete)
+        read_radiance(&self.gpu, self.renderer.radiance())
     }
 
     /// How long the passes of the last frame took; `None` where the device has no clocks for them. Ask after

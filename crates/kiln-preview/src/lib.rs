@@ -3,7 +3,7 @@
 //! Start at [`HeadlessViewer`]: revisions in, pictures out. [`run_window`] and [`run_headless`] put a connection to
 //! the daemon in front of it. In a window three threads work: one talks to the daemon, one prepares device
 //! resources for the newest revision, one draws what was prepared last; a revision that cannot be used never takes
-//! the picture away.
+//! the picture away. Three more wait for what frames must not wait for: their end, differences, files.
 //!
 //! Conventions: right-handed, +Y up; shaders are bound by name as `docs/shader-interface.md` says; radiance is
 //! linear until the tonemap shader, whose output is sRGB-encoded; depth 0 is near.
@@ -22,6 +22,7 @@ pub use channel::{Channel, Encoding};
 pub use faults::FaultCounts;
 pub use headless::HeadlessViewer;
 pub use inspect::{Inspection, InspectionState};
+pub use look::{LOOK_BYTES_MAX, Look, LookSheet};
 pub use material_list::ListedMaterial;
 pub use parameter::{OfferedParameter, ParameterValues};
 pub use pass_timer::PassTime;
@@ -44,31 +45,40 @@ mod frame_watcher;
 mod ground;
 mod harmonics;
 mod headless;
+mod history;
 mod inspect;
 mod inspector;
 mod keeper;
 mod lights;
 mod live_picture;
 mod live_probe;
+mod look;
 mod material_list;
+mod measurer;
+mod memory;
 mod mip;
 mod neutral;
 mod own;
 mod panel;
 mod parameter;
 mod pass_timer;
+mod pick;
 mod picture;
 mod pose;
 mod prepare;
 mod probe;
 mod program;
+mod readout;
 mod renderer;
 mod report;
 mod run;
 mod scaling;
+mod saved;
 mod scene_color;
 mod scene_gpu;
 mod shadow;
+mod shot;
+mod side_picture;
 mod slot;
 mod sun;
 mod target;

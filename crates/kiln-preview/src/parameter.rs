@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use kiln_shader::{BindingKind, Parameter, ParameterPlace, Reflection, Widget};
+use serde::{Deserialize, Serialize};
 
 use crate::slot::Slot;
 use crate::uniform::long_type_name;
@@ -120,9 +121,40 @@ fn first_value(parameter: &Parameter, count: usize) -> Vec<f64> {
 
 /// What the user set; every other parameter has its first value. A value outlives reloads of its shader as long as the
 /// shader has, or gets again, a parameter of that name and type.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(from = "Vec<Written>", into = "Vec<Written>")]
 pub struct ParameterValues {
     by_name: BTreeMap<(String, String), Setting>,
+}
+
+/// A setting as files have it: a list, because keys of JSON objects are single strings.
+#[derive(Serialize, Deserialize)]
+struct Written {
+    shader: String,
+    name: String,
+    #[serde(rename = "type")]
+    ty: String,
+    #[serde(default, rename = "override")]
+    is_override: bool,
+    value: Vec<f64>,
+}
+
+impl From<Vec<Written>> for ParameterValues {
+    fn from(written: Vec<Written>) -> Self {
+        let setting = |Written { shader, name, ty, is_override, value }: Written| {
+            ((shader, name), Setting { ty, is_override, value })
+        };
+        ParameterValues { by_name: written.into_iter().map(setting).collect() }
+    }
+}
+
+impl From<ParameterValues> for Vec<Written> {
+    fn from(values: ParameterValues) -> Self {
+        let written = |((shader, name), Setting { ty, is_override, value }): ((String, String), Setting)| {
+            Written { shader, name, ty, is_override, value }
+        };
+        values.by_name.into_iter().map(written).collect()
+    }
 }
 
 #[derive(Clone, Debug, PartialEq)]

@@ -27,6 +27,8 @@ pub(crate) struct Stand {
     pub visible: bool,
     /// Middle in the world, to sort by.
     pub center: Vec3,
+    /// Half of its box's edges in the world.
+    pub half: Vec3,
 }
 
 impl Pose {
@@ -49,7 +51,7 @@ impl Pose {
             let first = draw.instances.first().map_or(Mat4::IDENTITY, kiln_scene::Instance::matrix);
             let mirrored = (placed.world * first).determinant() < 0.0;
             let (world, visible) = (placed.world, placed.visible);
-            self.draws.push(Stand { world, mirrored, visible, center: block.center });
+            self.draws.push(Stand { world, mirrored, visible, center: block.center, half: block.half });
             if visible && block.is_finite() {
                 all = Some(all.map_or(block, |all| all.union(block)));
             }

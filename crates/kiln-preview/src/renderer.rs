@@ -155,11 +155,6 @@ impl Renderer {
         });
     }
 
-    /// What is shown.
-    pub fn shown(&self) -> Option<&Prepared> {
-        self.shown.as_ref().map(|shown| &*shown.prepared)
-    }
-
     /// Whether frames go through a picture of the opaque scene.
     #[cfg(test)]
     pub fn draws_scene_color(&self) -> bool {
@@ -195,6 +190,18 @@ impl Renderer {
     /// Width / height.
     pub fn aspect(&self) -> f32 {
         self.picture.size[0] as f32 / self.picture.size[1] as f32
+    }
+
+    /// Where everything is in the last frame.
+    pub fn pose(&self) -> Option<&Pose> {
+        self.shown.as_ref()?.pose.as_ref()
+    }
+
+    /// Poses the scene anew with the next frame: another renderer posed what they share.
+    pub fn forget_pose(&mut self) {
+        if let Some(shown) = &mut self.shown {
+            shown.written = None;
+        }
     }
 
     /// The camera that `view` asks for.

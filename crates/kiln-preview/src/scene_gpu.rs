@@ -101,6 +101,20 @@ impl GpuScene {
         })
     }
 
+    /// The materials' textures, some of them more than once.
+    pub fn textures(&self) -> impl Iterator<Item = &wgpu::Texture> {
+        self.textures.iter().map(|(view, _)| view.texture())
+    }
+
+    /// Geometry, and how it is copied and deformed.
+    pub fn buffers(&self) -> impl Iterator<Item = &wgpu::Buffer> {
+        let of_meshes = self.meshes.iter().flat_map(|mesh| {
+            [&mesh.vertices, &mesh.indices].into_iter().chain(&mesh.influences).chain(&mesh.morph_deltas)
+        });
+        let moving = self.instances.iter().chain(&self.joint_matrices).chain(&self.morph_weights);
+        of_meshes.chain(moving.flatten())
+    }
+
     /// Writes how skins and morphing draws are deformed.
     pub fn write_deformation(&self, gpu: &Gpu, posed: &Posed) {
         for (buffer, matrices) in self.joint_matrices.iter().zip(&posed.skins) {

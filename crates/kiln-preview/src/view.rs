@@ -2,13 +2,16 @@
 
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+
 use crate::camera::OrbitCamera;
 use crate::channel::Channel;
 use crate::inspect::GROUP;
 use crate::parameter::ParameterValues;
 
 /// Which scene and environment to show.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Selection {
     /// Name of the scene; `None` = the project's first.
     pub scene: Option<String>,
@@ -21,7 +24,8 @@ pub struct Selection {
 }
 
 /// Where the irradiance of an environment comes from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum DiffuseSource {
     /// The baked map.
     #[default]
@@ -31,7 +35,7 @@ pub enum DiffuseSource {
 }
 
 /// A moment of one of the scene's animations.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AnimationTime {
     /// Index into [`crate::ApplyReport::animations`]; an index that is not there is the rest pose.
     pub index: usize,
@@ -49,7 +53,8 @@ impl Selection {
 }
 
 /// What is to be seen behind the scene. What shines through glass is the environment in any case.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Background {
     /// The environment, as blurred as [`View::background_blur`] says.
     #[default]
@@ -89,7 +94,8 @@ pub(crate) fn from_srgb(value: u8) -> f32 {
 }
 
 /// What is drawn on the floor, which is at the lowest point of the scene at rest.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Ground {
     /// Lines, each tenth one stronger: 1 m and 10 m apart under things of some metres, else a power of ten as far.
     pub has_grid: bool,
@@ -114,8 +120,10 @@ impl FromStr for Ground {
 }
 
 /// How the selected scene is shown. None of it needs a rebuild, but that channels and marks need variants of the scene's
-/// shader which the daemon makes for who wants them.
-#[derive(Clone, Debug, PartialEq)]
+/// shader which the daemon makes for who wants them. As JSON it keeps every bit, and what a file does not say is
+/// as in [`View::default`]: what is added here later needs no new format.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct View {
     /// Exposure in stops: radiance is multiplied by 2^EV.
     pub exposure_ev: f32,

@@ -10,10 +10,11 @@ use kiln_gpu::Gpu;
 use kiln_link::{ClientEvent, Revision};
 
 use crate::connection::{Connection, Heard};
-use crate::frame_watcher::FrameWatcher;
+use crate::frame_watcher::{Finished, FrameWatcher};
 use crate::live_picture::LivePicture;
 use crate::panel::{self, PanelState, Progress};
 use crate::parameter::ParameterValues;
+use crate::saved::{Saved, SavedFile};
 use crate::theme;
 use crate::view::{Selection, View};
 use crate::worker::{Request, Worker};
@@ -25,12 +26,16 @@ pub struct WindowOptions {
     pub socket: PathBuf,
     /// Title of the window.
     pub title: String,
-    /// Width and height of the window in points.
+    /// Width and height of the window in points, where nothing is remembered.
     pub size: [f32; 2],
-    /// What to show at first.
+    /// What to show at first, where it is given; else what is remembered.
     pub selection: Selection,
-    /// How to show it at first.
+    /// How to show it at first: what is not as in [`View::default`]; the rest is as it is remembered.
     pub view: View,
+    /// Folder for screenshots, made with the first one.
+    pub pictures: PathBuf,
+    /// File in which the window remembers how it was; `None` = nothing is read or written.
+    pub state: Option<PathBuf>,
 }
 
 /// Device errors kept on screen.
@@ -42,10 +47,13 @@ const DEVICE_ERRORS_SHOWN_MAX: usize = 8;
 /// No display, or no device that can draw to it.
 pub fn run_window(options: WindowOptions) -> anyhow::Result<()> {
     let title = options.title.clone();
+    let (read, note) = options.state.as_deref().map_or_else(Default::default, Saved::read);
+    let saved = read.clone().with_given(&options.selection, &options.view);
+    let size = saved.layout.window_points.unwrap_or(options.size);
     let native = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title(title.clone())
-            .with_inner_size(options.size)
+            .with_inner_size(size)
             .with_min_inner_size([640.0, 400.0]),
         renderer: eframe::Renderer::Wgpu,
         wgpu_options: eframe::egui_wgpu::WgpuConfiguration {
@@ -59,9 +67,16 @@ pub fn run_window(options: WindowOptions) -> anyhow::Result<()> {
         persist_window: false,
         ..Default::default()
     };
-    eframe::run_native(&title, native, Box::new(|context| Ok(Box::new(Window::new(context, options)?))))
-        .map_err(|error| anyhow!("{error}"))
-        .context("opening the window")
+    let open = Box::new(move |context: &eframe::CreationContext<'_>| {
+        let file = options.state.clone().map(|path| SavedFile::new(path, read));
+        let mut window = Window::new(context, options, file)?;
+        context.egui_ctx.set_zoom_factor(saved.layout.zoom);
+        saved.restore(&mut window.panels);
+        window.panels.window_notes.extend(note);
+        window.requested = window.wanted();
+        Ok(Box::new(window) as Box<dyn eframe::App>)
+    });
+    eframe::run_native(&title, native, open).map_err(|error| anyhow!("{error}")).context("opening the window")
 }
 
 struct Window {
@@ -75,10 +90,17 @@ struct Window {
     requested: (Selection, ParameterValues),
     /// What the daemon was last told.
     told_wants: Vec<String>,
+    /// The newest revision, while an older one is held.
+    waiting: Option<(Arc<Revision>, f64)>,
+    saved: Option<SavedFile>,
 }
 
 impl Window {
-    fn new(context: &eframe::CreationContext<'_>, options: WindowOptions) -> anyhow::Result<Self> {
+    fn new(
+        context: &eframe::CreationContext<'_>,
+        options: WindowOptions,
+        saved: Option<SavedFile>,
+    ) -> anyhow::Result<Self> {
         theme::apply(&context.egui_ctx);
         let render_state = context.wgpu_render_state.clone().context("the window has no wgpu device")?;
         let (device, queue) = (render_state.device.clone(), render_state.queue.clone());
@@ -94,7 +116,13 @@ impl Window {
         let watcher = FrameWatcher::spawn(reports, waker(&context.egui_ctx))?;
         let panels = PanelState::new(gpu.description(), options.selection.clone(), options.view);
         Ok(Window {
-            picture: LivePicture::new(gpu.clone(), render_state, watcher),
+            picture: LivePicture::new(
+                gpu.clone(),
+                render_state,
+                watcher,
+                options.pictures,
+                &context.egui_ctx,
+            )?,
             gpu,
             connection,
             worker,
@@ -102,6 +130,8 @@ impl Window {
             revision: None,
             requested: (options.selection, ParameterValues::default()),
             told_wants: Vec::new(),
+            waiting: None,
+            saved,
         })
     }
 
@@ -122,11 +152,12 @@ impl Window {
         }
         if let Some(ready) = self.worker.take() {
             let is_new = ready.prepared.report.revision != self.panels.report.revision;
-            self.panels.report = ready.prepared.report.clone();
+            self.panels.adopt(ready.prepared.report.clone());
             self.picture.replace(ready, is_new);
         }
-        if let Some(latency_ms) = self.picture.latency_ms() {
-            self.panels.latency_ms = Some(latency_ms);
+        for Finished { report, latency_ms } in self.picture.finished() {
+            self.panels.history.note_frame(&report);
+            self.panels.latency_ms = latency_ms.or(self.panels.latency_ms);
         }
         self.panels.device_errors.extend(self.gpu.take_errors());
         self.panels.device_errors.extend(self.gpu.lost().filter(|_| self.panels.device_errors.is_empty()));
@@ -135,7 +166,12 @@ impl Window {
     }
 
     fn receive(&mut self, revision: Arc<Revision>, received_unix_ms: f64) {
-        self.panels.receive(&revision.table);
+        self.panels.receive(&revision.table, received_unix_ms);
+        if self.panels.hold.is_on && self.revision.is_some() {
+            self.panels.hold.waiting = Some(revision.table.number);
+            self.waiting = Some((revision, received_unix_ms));
+            return;
+        }
         self.revision = Some((revision, received_unix_ms));
         self.request();
     }
@@ -146,6 +182,30 @@ impl Window {
         if wants != self.told_wants {
             self.connection.want(wants.clone());
             self.told_wants = wants;
+        }
+    }
+
+    /// Goes on to the revision that waits, once it may.
+    fn let_go(&mut self) {
+        if self.panels.hold.is_on {
+            return;
+        }
+        self.panels.hold.waiting = None;
+        if let Some(waiting) = self.waiting.take() {
+            self.revision = Some(waiting);
+            self.request();
+        }
+    }
+
+    /// Remembers how the window is.
+    fn remember(&mut self, context: &egui::Context, is_last: bool) {
+        let Some(saved) = &mut self.saved else { return };
+        let layout = &mut self.panels.layout;
+        layout.zoom = context.zoom_factor();
+        let inner = context.input(|input| input.viewport().inner_rect);
+        layout.window_points = inner.map(|it| [it.width(), it.height()].map(|side| side * layout.zoom));
+        if let Some(left) = saved.keep(Saved::of(&self.panels), is_last) {
+            context.request_repaint_after(left);
         }
     }
 
@@ -172,10 +232,18 @@ impl eframe::App for Window {
         self.take_news();
         let Window { panels, picture, .. } = self;
         panel::show(ui, panels, |ui, state| picture.show(ui, state));
+        self.let_go();
+        self.remember(ui.ctx(), false);
         if self.wanted() != self.requested {
             self.request();
         }
         self.tell_wants();
+    }
+
+    fn on_exit(&mut self) {
+        if let Some(saved) = &mut self.saved {
+            saved.keep(Saved::of(&self.panels), true);
+        }
     }
 
     fn clear_color(&self, _visuals: &egui::Visuals) -> [f32; 4] {

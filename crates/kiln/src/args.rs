@@ -5,8 +5,10 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, Parser, Subcommand};
 
 mod inspect;
+mod render;
 mod shader;
 
+pub(crate) use render::*;
 pub(crate) use shader::*;
 
 /// Look-dev without the wait: bakes image-based lighting without noise, checks shaders, and shows every edit
@@ -402,9 +404,12 @@ pub(crate) struct PreviewArgs {
     /// Go on: write revision_0001.png … for every revision until ended, through daemons that come and go
     #[arg(long, requires = "headless", conflicts_with_all = ["frames", "turn", "json", "param"])]
     pub(crate) follow: bool,
-    /// Folder for frame_0001.png … and report.json
-    #[arg(long, default_value = "frames", requires = "headless")]
-    pub(crate) out: PathBuf,
+    /// Folder for pictures: frame_0001.png … and report.json, or the window's screenshots [default: frames; of a window the one in the project]
+    #[arg(long)]
+    pub(crate) out: Option<PathBuf>,
+    /// Do not remember how the window was, and open it as at first
+    #[arg(long, conflicts_with = "headless")]
+    pub(crate) fresh: bool,
     /// Picture size in pixels
     #[arg(long, default_value = "1280x720", value_parser = parse_size, requires = "headless")]
     pub(crate) size: [u32; 2],
@@ -426,9 +431,6 @@ pub(crate) struct PreviewArgs {
     /// Exposure in stops
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     pub(crate) exposure: f32,
-    /// What diffuse light is read from: the baked map, or the harmonics, to see what engines show that read these
-    #[arg(long, value_enum, default_value_t = Diffuse::Map)]
-    pub(crate) diffuse: Diffuse,
     /// Set a parameter that a shader's author offers: wetness=0.5, tonemap.tint=1,0.9,0.8, is_lit=false, mode=smooth
     #[arg(long, value_name = "[SHADER.]NAME=VALUE", requires = "headless")]
     pub(crate) param: Vec<kiln_preview::Assignment>,
@@ -438,88 +440,6 @@ pub(crate) struct PreviewArgs {
 }
 
 #[cfg(feature = "preview")]
-#[derive(Debug, ClapArgs)]
-#[command(after_help = "\
-Examples:
-  kiln render look                                          the first scene under its own light
-  kiln render look --scene all --env all --sheet sheet.png  every scene under every light, on one picture too
-  kiln render look --vary tone_mapper --sheet curves.png    one picture for each choice of a shader's parameter
-  kiln render look --camera Front --frames 36 --turn 10 --exr
-
-Exit codes: 0 drawn, 1 something in the project is wrong (what can be drawn is), 2 the tool failed.")]
-pub(crate) struct RenderArgs {
-    #[command(flatten)]
-    pub(crate) build: BuildArgs,
-    /// Scene to draw, may be given more than once; `all` draws every one [default: the project's first]
-    #[arg(long)]
-    pub(crate) scene: Vec<String>,
-    /// Environment to draw it in, may be given more than once; `all` takes every one [default: the scene's own]
-    #[arg(long)]
-    pub(crate) env: Vec<String>,
-    /// Camera of the glTF file to draw through [default: its first, else one that shows the whole scene]
-    #[arg(long)]
-    pub(crate) camera: Option<String>,
-    /// Variant of the glTF file's materials (KHR_materials_variants) [default: none]
-    #[arg(long, value_name = "NAME")]
-    pub(crate) material_variant: Option<String>,
-    /// Animation of the glTF file to draw a moment of, by name or number from 0 [default: none, the rest pose]
-    #[arg(long, value_name = "NAME|INDEX")]
-    pub(crate) animation: Option<String>,
-    /// Time of the first frame in the animation, in seconds
-    #[arg(long, default_value_t = 0.0, requires = "animation", value_name = "SECONDS")]
-    pub(crate) time: f64,
-    /// Frames a second of the animation
-    #[arg(long, default_value_t = 30.0, requires = "animation", value_parser = parse_rate)]
-    pub(crate) fps: f64,
-    /// Picture size in pixels
-    #[arg(long, default_value = "1280x720", value_parser = parse_size)]
-    pub(crate) size: [u32; 2],
-    /// Number of frames of each
-    #[arg(long, default_value_t = 1)]
-    pub(crate) frames: usize,
-    /// Turn the environment by this much from frame to frame, in degrees
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
-    pub(crate) turn: f32,
-    /// Exposure in stops
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
-    pub(crate) exposure: f32,
-    /// What diffuse light is read from: the baked map, or the harmonics, to see what engines show that read these
-    #[arg(long, value_enum, default_value_t = Diffuse::Map)]
-    pub(crate) diffuse: Diffuse,
-    /// What is behind the scene: environment, checker, or a colour as #rrggbb (sRGB; exposure leaves it, the tone mapper does not)
-    #[arg(long, default_value = "environment", value_name = "WHAT")]
-    pub(crate) background: kiln_preview::Background,
-    /// What is below the scene: none, grid, shadow (that of the extracted sun) or grid+shadow
-    #[arg(long, default_value = "none", value_name = "WHAT")]
-    pub(crate) ground: kiln_preview::Ground,
-    /// Set a parameter that a shader's author offers: wetness=0.5, tonemap.tint=1,0.9,0.8, tone_mapper=agx
-    #[arg(long, value_name = "[SHADER.]NAME=VALUE")]
-    pub(crate) param: Vec<kiln_preview::Assignment>,
-    /// Draw one picture for each choice of this parameter
-    #[arg(long, value_name = "[SHADER.]NAME")]
-    pub(crate) vary: Option<String>,
-    /// Folder for SCENE-ENV.png …
-    #[arg(long, default_value = "frames")]
-    pub(crate) out: PathBuf,
-    /// Write the radiance before exposure and tone mapping besides, as OpenEXR
-    #[arg(long)]
-    pub(crate) exr: bool,
-    /// Lay all pictures out on one, a row for each scene under each light
-    #[arg(long, value_name = "FILE.png")]
-    pub(crate) sheet: Option<PathBuf>,
-    #[command(flatten)]
-    pub(crate) inspect: inspect::InspectArgs,
-}
-
-/// What diffuse light is read from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub(crate) enum Diffuse {
-    /// The baked irradiance map.
-    Map,
-    /// The spherical harmonics.
-    Harmonics,
-}
-
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "\
 Examples:

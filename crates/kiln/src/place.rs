@@ -125,6 +125,15 @@ pub(crate) fn project_folder(dir: &Path) -> anyhow::Result<PathBuf> {
     })
 }
 
+/// Where the window of the project in the canonical `folder` remembers how it was; `None` where the user has no such place.
+#[cfg(feature = "preview")]
+pub(crate) fn window_state_file(folder: &Path) -> Option<PathBuf> {
+    let variable = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
+    let state = variable("XDG_STATE_HOME").or_else(|| Some(variable("HOME")?.join(".local/state")))?;
+    let name = kiln_build::Digest::of(folder.as_os_str().as_encoded_bytes()).to_string();
+    Some(state.join("kiln/windows").join(format!("{}.json", &name[..16])))
+}
+
 /// Whether a window could be opened.
 #[cfg(feature = "preview")]
 pub(crate) fn has_display() -> bool {

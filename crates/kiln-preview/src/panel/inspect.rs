@@ -52,9 +52,9 @@ fn show_channels(ui: &mut Ui, state: &mut PanelState) {
     response.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::ComboBox, true, "channel"));
     let Some(channel) = view.channel else { return };
     if let Some(refusal) = report.inspection.refusal(channel) {
-        ui.label(RichText::new(format!("Not shown: {refusal}.")).small().color(theme::WARNING));
+        ui.label(RichText::new(format!("Not shown: {refusal}.")).small().color(theme::of(ui).warning));
     } else if report.inspection.state == InspectionState::NotAsked {
-        ui.label(RichText::new("Waiting for the shaders that show it.").small().color(theme::WEAK));
+        ui.label(RichText::new("Waiting for the shaders that show it.").small().color(theme::of(ui).weak));
     } else {
         show_legend(ui, channel, &report.inspection.variants);
     }
@@ -70,7 +70,7 @@ fn show_legend(ui: &mut Ui, channel: Channel, variants: &[(String, [f32; 3])]) {
         Encoding::Radiance => "What it adds to the picture, exposed and tone-mapped.",
     };
     if channel != Channel::Variant {
-        ui.label(RichText::new(text).small().color(theme::WEAK));
+        ui.label(RichText::new(text).small().color(theme::of(ui).weak));
     }
     if channel == Channel::Mip {
         ui.horizontal(|ui| {
@@ -111,13 +111,13 @@ fn show_marks(ui: &mut Ui, state: &mut PanelState) {
     });
     if let InspectionState::Unable(reason) = &report.inspection.state {
         let text = format!("Only what the shader writes is seen, as 16-bit floats: {reason}.");
-        ui.label(RichText::new(text).small().color(theme::WEAK));
+        ui.label(RichText::new(text).small().color(theme::of(ui).weak));
     }
     for (name, count, color) in findings.faults.unwrap_or_default().rows() {
         ui.horizontal(|ui| {
             swatch(ui, color);
             let text = RichText::new(format!("{name}: {count} pixels")).small();
-            ui.label(if count > 0 { text.color(theme::ERROR) } else { text.color(theme::WEAK) });
+            ui.label(if count > 0 { text.color(theme::of(ui).error) } else { text.color(theme::of(ui).weak) });
         });
     }
 }
@@ -127,12 +127,12 @@ pub(super) fn show_probe(ui: &mut Ui, probe: Option<&PixelProbe>) {
     section(ui, "Pixel");
     let Some(probe) = probe else {
         let help = "Point at the picture; right click pins a pixel, and right click again lets it go.";
-        ui.label(RichText::new(help).small().color(theme::WEAK));
+        ui.label(RichText::new(help).small().color(theme::of(ui).weak));
         return;
     };
     Grid::new("pixel").num_columns(2).spacing([12.0, 2.0]).show(ui, |ui| {
         for (name, value) in probe_rows(probe) {
-            ui.label(RichText::new(name).small().color(theme::WEAK));
+            ui.label(RichText::new(name).small().color(theme::of(ui).weak));
             ui.label(RichText::new(value).monospace().small());
             ui.end_row();
         }
@@ -178,7 +178,7 @@ pub(super) fn show_times(ui: &mut Ui, findings: &Findings) {
     section(ui, "Frame");
     Grid::new("times").num_columns(2).spacing([12.0, 2.0]).show(ui, |ui| {
         let mut line = |name: &str, value: String| {
-            ui.label(RichText::new(name).small().color(theme::WEAK));
+            ui.label(RichText::new(name).small().color(theme::of(ui).weak));
             ui.label(RichText::new(value).monospace().small());
             ui.end_row();
         };

@@ -21,16 +21,16 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState) {
                 format!("{} draws", material.draw_count)
             };
             ui.label(
-                RichText::new(format!("variant {}, {draws}", material.variant)).small().color(theme::ACCENT),
+                RichText::new(format!("variant {}, {draws}", material.variant)).small().color(theme::of(ui).accent),
             );
             for (effect, why) in &material.effects {
                 ui.horizontal_wrapped(|ui| {
                     ui.label(RichText::new(effect.name()).small().strong());
-                    ui.label(RichText::new(why).small().color(theme::WEAK));
+                    ui.label(RichText::new(why).small().color(theme::of(ui).weak));
                 });
             }
             if material.effects.is_empty() {
-                ui.label(RichText::new("metal and roughness alone").small().color(theme::WEAK));
+                ui.label(RichText::new("metal and roughness alone").small().color(theme::of(ui).weak));
             }
         });
     }

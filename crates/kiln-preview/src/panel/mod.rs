@@ -1,24 +1,40 @@
 //! The panels: plain state in, plain state out, no device and no connection, so that tests drive them as users do.
 
+use std::collections::BTreeMap;
+
 use egui::{CentralPanel, Panel, Ui};
-use kiln_diagnostic::Diagnostic;
-use kiln_link::{RevisionTable, Work};
+use kiln_diagnostic::{Diagnostic, Severity};
+use kiln_link::{RevisionTable, TargetState};
 
 pub(crate) use self::inspect::Findings;
-use self::scene::Playback;
+
+use self::compare::Compare;
+use self::hold::Hold;
+use self::scene::{NamedView, Playback};
+use self::shots::Shots;
+use self::turntable::Turntable;
+use crate::history::History;
 use crate::report::ApplyReport;
+use crate::saved::Layout;
 use crate::theme;
 use crate::view::{Selection, View};
 
+mod appearance;
+pub(crate) mod compare;
 mod diagnostics;
+mod help;
+mod hold;
 mod inspect;
+pub(crate) mod keys;
 mod materials;
 mod parameters;
-mod scene;
+pub(crate) mod scene;
+pub(crate) mod shots;
 mod side;
 mod surroundings;
 mod timeline;
 mod top;
+pub(crate) mod turntable;
 
 /// Whether there is a daemon.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -54,8 +70,6 @@ pub(crate) struct PanelState {
     pub diagnostics: Vec<Diagnostic>,
     /// What the device reported, newest last.
     pub device_errors: Vec<String>,
-    /// The last build.
-    pub work: Work,
     /// From noticing the change to the finished frame.
     pub latency_ms: Option<f64>,
     /// What the user chose; the window prepares it when it changes.
@@ -64,6 +78,33 @@ pub(crate) struct PanelState {
     pub view: View,
     pub playback: Playback,
     pub findings: Findings,
+    /// Every build that was heard of.
+    pub history: History,
+    pub hold: Hold,
+    pub compare: Compare,
+    pub shots: Shots,
+    pub turntable: Turntable,
+    /// What to bring into view with the next frame.
+    pub frame_asked: Option<Framing>,
+    /// Since which revision targets are stale.
+    pub stale_since: BTreeMap<String, u64>,
+    /// Whether the card of diagnostics is open; new ones open it.
+    pub are_diagnostics_open: bool,
+    pub is_help_open: bool,
+    pub are_panels_hidden: bool,
+    /// Cameras that the user named.
+    pub named_views: Vec<NamedView>,
+    pub layout: Layout,
+    /// What the window has to say of itself.
+    pub window_notes: Vec<String>,
+}
+
+/// What to bring into view.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Framing {
+    Scene,
+    /// What lies below a place of the picture, 0 to 1 from its top left; the scene where nothing does.
+    At([f32; 2]),
 }
 
 impl PanelState {
@@ -77,20 +118,58 @@ impl PanelState {
             report: ApplyReport::default(),
             diagnostics: Vec::new(),
             device_errors: Vec::new(),
-            work: Work::default(),
             latency_ms: None,
             selection,
             view,
             playback: Playback::default(),
             findings: Findings::default(),
+            history: History::default(),
+            hold: Hold::default(),
+            compare: Compare::default(),
+            shots: Shots::default(),
+            turntable: Turntable::default(),
+            frame_asked: None,
+            stale_since: BTreeMap::new(),
+            are_diagnostics_open: true,
+            is_help_open: false,
+            are_panels_hidden: false,
+            named_views: Vec::new(),
+            layout: Layout::default(),
+            window_notes: Vec::new(),
         }
     }
 
     /// Takes over what a new revision says; the picture follows when it is prepared.
-    pub fn receive(&mut self, table: &RevisionTable) {
+    pub fn receive(&mut self, table: &RevisionTable, received_unix_ms: f64) {
+        if self.diagnostics != table.diagnostics {
+            // Notes wait for whoever wants to read them.
+            self.are_diagnostics_open = table.diagnostics.iter().any(|it| it.severity > Severity::Note);
+        }
         self.diagnostics = table.diagnostics.clone();
-        self.work = table.work.clone();
+        self.note_stale(table);
+        self.history.receive(table, received_unix_ms);
         self.progress = None;
+    }
+
+    /// Takes over what came of a revision that is shown from now on.
+    pub fn adopt(&mut self, report: ApplyReport) {
+        self.are_diagnostics_open |=
+            report.diagnostics.iter().any(|it| !self.report.diagnostics.contains(it));
+        self.report = report;
+    }
+
+    fn note_stale(&mut self, table: &RevisionTable) {
+        let stale = table.targets.iter().filter(|(_, target)| target.state == TargetState::Stale);
+        // A daemon that counts from 1 again knows no more than that they are.
+        let since = |name: &String| *self.stale_since.get(name).unwrap_or(&table.number).min(&table.number);
+        self.stale_since = stale.map(|(name, _)| (name.clone(), since(name))).collect();
+    }
+
+    /// Shows another scene. What was right for the one before is not for it: camera, light, variant, animation.
+    pub fn choose_scene(&mut self, scene: String) {
+        (self.view.camera, self.view.scene_camera, self.view.animation) = (None, 0, None);
+        let diffuse = self.selection.diffuse;
+        self.selection = Selection { scene: Some(scene), diffuse, ..Selection::default() };
     }
 
     /// The daemon is gone, or there never was one.
@@ -110,17 +189,34 @@ impl PanelState {
 
 /// Lays the panels out around the picture, which `show_picture` draws in the space left.
 pub(crate) fn show(ui: &mut Ui, state: &mut PanelState, show_picture: impl FnOnce(&mut Ui, &mut PanelState)) {
+    theme::choose(ui.ctx(), state.layout.theme);
+    keys::dispatch(ui, state);
     scene::play(ui, state);
-    let bar = Panel::top("top").frame(theme::panel_frame());
-    bar.show(ui, |ui| top::show(ui, state));
-    let timeline = Panel::bottom("timeline").frame(theme::panel_frame()).resizable(true);
-    timeline.default_size(132.0).size_range(44.0..=420.0).show(ui, |ui| timeline::show(ui, state));
-    let side = Panel::right("side").frame(theme::panel_frame()).resizable(true);
-    side.default_size(296.0).size_range(240.0..=440.0).show(ui, |ui| side::show(ui, state));
+    if !state.are_panels_hidden {
+        show_panels(ui, state);
+    }
     let picture = CentralPanel::default().frame(egui::Frame::new().fill(theme::VIEWPORT));
     picture.show(ui, |ui| {
         let place = ui.max_rect();
         show_picture(ui, state);
         diagnostics::show_over(ui, place, state);
+        hold::show_over(ui, place, state);
+        shots::show_over(ui, place, state);
+        help::show_over(ui, state);
     });
+}
+
+fn show_panels(ui: &mut Ui, state: &mut PanelState) {
+    let bar = Panel::top("top").frame(theme::panel_frame(ui));
+    bar.show(ui, |ui| top::show(ui, state));
+    let timeline = Panel::bottom("timeline").frame(theme::panel_frame(ui)).resizable(true);
+    // The picture keeps most of a small window; before the first frame it has no size yet.
+    let share = 0.28 * ui.available_height().max(360.0);
+    let timeline = timeline.default_size(state.layout.timeline_points.min(share)).size_range(44.0..=420.0);
+    let shown = timeline.show(ui, |ui| timeline::show(ui, state));
+    state.layout.timeline_points = shown.response.rect.height();
+    let side = Panel::right("side").frame(theme::panel_frame(ui)).resizable(true);
+    let side = side.default_size(state.layout.side_points).size_range(240.0..=440.0);
+    let shown = side.show(ui, |ui| side::show(ui, state));
+    state.layout.side_points = shown.response.rect.width();
 }

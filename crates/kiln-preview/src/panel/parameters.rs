@@ -4,7 +4,6 @@ use egui::{Checkbox, ComboBox, RichText, Slider, Ui, WidgetInfo};
 use kiln_shader::Widget;
 
 use crate::parameter::{OfferedParameter, ParameterValues};
-use crate::theme;
 
 /// Room for the number behind a slider.
 const NUMBER_WIDTH: f32 = 72.0;
@@ -110,5 +109,5 @@ fn show_choice(ui: &mut Ui, parameter: &OfferedParameter, names: &[String], valu
 fn help(parameter: &OfferedParameter) -> RichText {
     let kind = if parameter.is_override { "override" } else { "member of params" };
     let about = if parameter.label.is_empty() { "" } else { "\n" };
-    RichText::new(format!("{}{about}{}, {kind}", parameter.label, parameter.ty)).color(theme::TEXT)
+    RichText::new(format!("{}{about}{}, {kind}", parameter.label, parameter.ty))
 }

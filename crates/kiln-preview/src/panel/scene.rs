@@ -1,8 +1,10 @@
 //! What the shown scene offers: material variants, animations with their player, cameras.
 
-use egui::{Checkbox, ComboBox, Key, Modifiers, Slider, Ui};
+use egui::{Checkbox, ComboBox, Slider, Ui};
+use serde::{Deserialize, Serialize};
 
 use super::PanelState;
+use crate::camera::OrbitCamera;
 use crate::report::OfferedAnimation;
 use crate::view::AnimationTime;
 
@@ -22,19 +24,16 @@ impl Default for Playback {
     }
 }
 
-/// Lets the animation run on by the time since the last frame, and takes the space bar if nobody else wants it.
+/// Lets the animation run on by the time since the last frame.
 pub(super) fn play(ui: &Ui, state: &mut PanelState) {
-    let is_free = ui.ctx().memory(|memory| memory.focused().is_none());
-    if is_free && ui.input_mut(|input| input.consume_key(Modifiers::NONE, Key::Space)) {
-        toggle(state);
-    }
     if state.playback.is_playing {
         advance(state, f64::from(ui.input(|input| input.stable_dt)));
         ui.ctx().request_repaint();
     }
 }
 
-fn toggle(state: &mut PanelState) {
+/// Plays or pauses; without animations nothing happens.
+pub(super) fn toggle(state: &mut PanelState) {
     let Some(first) = state.report.animations.first() else { return };
     let time = state.view.animation.get_or_insert(AnimationTime { index: 0, time_s: 0.0 });
     let playing = state.report.animations.get(time.index).unwrap_or(first);
@@ -112,6 +111,49 @@ pub(super) fn show_cameras(ui: &mut Ui, state: &mut PanelState) {
         view.camera = None;
         view.scene_camera = chosen;
     }
+}
+
+/// A camera that the user keeps under a name.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct NamedView {
+    pub name: String,
+    /// The scene it belongs to.
+    pub scene: String,
+    pub camera: OrbitCamera,
+}
+
+/// Views kept at most.
+pub(crate) const NAMED_VIEWS_MAX: usize = 64;
+
+/// Keeps the camera under a number, and goes back to those that were kept for this scene.
+pub(super) fn show_named_views(ui: &mut Ui, state: &mut PanelState) {
+    let PanelState { named_views, view, report, .. } = state;
+    let Some(scene) = &report.shown.scene else { return };
+    ui.horizontal_wrapped(|ui| {
+        let keep = ui.add_enabled(
+            view.camera.is_some() && named_views.len() < NAMED_VIEWS_MAX,
+            egui::Button::new("Keep view"),
+        );
+        if let Some(camera) =
+            view.camera.filter(|_| keep.on_hover_text("this camera, under a number").clicked())
+        {
+            let is_free =
+                |name: &String| !named_views.iter().any(|it| it.scene == *scene && it.name == *name);
+            let name = (1..).map(|number| format!("view {number}")).find(is_free).unwrap_or_default();
+            named_views.push(NamedView { name, scene: scene.clone(), camera });
+        }
+        let mut dropped = None;
+        for (index, kept) in named_views.iter().enumerate().filter(|(_, kept)| kept.scene == *scene) {
+            let button = ui.selectable_label(view.camera == Some(kept.camera), &kept.name);
+            if button.clicked() {
+                view.camera = Some(kept.camera);
+            }
+            if button.on_hover_text("right click drops it").secondary_clicked() {
+                dropped = Some(index);
+            }
+        }
+        dropped.map(|index| named_views.remove(index));
+    });
 }
 
 /// A list with nothing as its first choice; the new choice, if one was made.

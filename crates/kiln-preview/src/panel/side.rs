@@ -4,17 +4,14 @@ use egui::{ComboBox, RichText, ScrollArea, Slider, Ui};
 
 use super::PanelState;
 use crate::theme;
-use crate::view::{DiffuseSource, Selection, View};
+use crate::view::{DiffuseSource, View};
 
 pub(super) fn show(ui: &mut Ui, state: &mut PanelState) {
     ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
         section(ui, "Scene");
         let shown = state.report.shown.scene.clone();
         if let Some(scene) = pick(ui, "scene", &state.report.scenes, shown.as_deref()) {
-            // What was right for the other scene is not for this one: camera, light, variant, animation.
-            (state.view.camera, state.view.scene_camera, state.view.animation) = (None, 0, None);
-            let diffuse = state.selection.diffuse;
-            state.selection = Selection { scene: Some(scene), diffuse, ..Selection::default() };
+            state.choose_scene(scene);
         }
         super::scene::show_variants(ui, state);
         super::scene::show_animations(ui, state);
@@ -30,20 +27,23 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState) {
         super::parameters::show(ui, &state.report.parameters, &mut state.view.parameters);
         section(ui, "Camera");
         super::scene::show_cameras(ui, state);
-        show_camera(ui, &mut state.view);
+        show_camera(ui, state);
         super::inspect::show(ui, state);
         super::inspect::show_probe(ui, state.findings.probe.as_ref());
         super::inspect::show_times(ui, &state.findings);
         super::materials::show(ui, state);
+        super::compare::show(ui, state);
+        super::shots::show(ui, state);
+        super::appearance::show(ui, state);
         show_notes(ui, state);
         ui.add_space(12.0);
-        ui.label(RichText::new(&state.adapter).small().color(theme::WEAK));
+        ui.label(RichText::new(&state.adapter).small().color(theme::of(ui).weak));
     });
 }
 
 pub(super) fn section(ui: &mut Ui, title: &str) {
     ui.add_space(10.0);
-    ui.label(RichText::new(title).strong().color(theme::WEAK));
+    ui.label(RichText::new(title).strong().color(theme::of(ui).weak));
 }
 
 /// A list to choose from; the new choice, if one was made.
@@ -102,23 +102,34 @@ pub(super) fn row(ui: &mut Ui, label: &str, slider: Slider<'_>) {
     ui.end_row();
 }
 
-fn show_camera(ui: &mut Ui, view: &mut View) {
-    if ui.add_enabled(view.camera.is_some(), egui::Button::new("Frame the scene")).clicked() {
-        view.camera = None;
-    }
-    let help = "Drag to turn, right or Shift drag to move, wheel to come closer, double click to frame.";
-    ui.label(RichText::new(help).small().color(theme::WEAK));
+fn show_camera(ui: &mut Ui, state: &mut PanelState) {
+    ui.horizontal(|ui| {
+        if ui.button("Frame the scene").on_hover_text("F").clicked() {
+            state.frame_asked = Some(super::Framing::Scene);
+        }
+        let reset = egui::Button::new("Scene's own");
+        if ui
+            .add_enabled(state.view.camera.is_some(), reset)
+            .on_hover_text("the camera it came with")
+            .clicked()
+        {
+            state.view.camera = None;
+        }
+    });
+    super::scene::show_named_views(ui, state);
+    super::turntable::show(ui, state);
+    ui.label(RichText::new("H shows all keys and what the hand does.").small().color(theme::of(ui).weak));
 }
 
 fn show_notes(ui: &mut Ui, state: &PanelState) {
-    if state.report.notes.is_empty() && state.device_errors.is_empty() {
+    if state.report.notes.is_empty() && state.device_errors.is_empty() && state.window_notes.is_empty() {
         return;
     }
     section(ui, "Notes");
-    for note in &state.report.notes {
+    for note in state.window_notes.iter().chain(&state.report.notes) {
         ui.label(RichText::new(note).small());
     }
     for error in &state.device_errors {
-        ui.label(RichText::new(error).small().color(theme::ERROR));
+        ui.label(RichText::new(error).small().color(theme::of(ui).error));
     }
 }

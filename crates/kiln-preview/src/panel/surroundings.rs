@@ -29,7 +29,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState) {
         ui.add(Checkbox::new(&mut ground.catches_shadow, "Shadow on the ground")).on_hover_text(help);
     });
     if ground.catches_shadow && !state.report.has_sun {
-        ui.label(RichText::new(NO_SUN).small().color(theme::WEAK));
+        ui.label(RichText::new(NO_SUN).small().color(theme::of(ui).weak));
     }
 }
 

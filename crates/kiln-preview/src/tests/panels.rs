@@ -52,7 +52,7 @@ fn diagnostic_shows_message_place_source_and_caret() {
     let diagnostic = Diagnostic::error("no definition in scope for `n_dot_vv`")
         .at("shaders/pbr/pbr.wgsl", text, at..at + 8)
         .with_help("did you mean `n_dot_v`?");
-    state.receive(&RevisionTable { diagnostics: vec![diagnostic], ..Default::default() });
+    state.receive(&RevisionTable { diagnostics: vec![diagnostic], ..Default::default() }, 0.0);
     let harness = harness(state);
     for label in [
         "no definition in scope for `n_dot_vv`",
@@ -90,7 +90,8 @@ fn stale_targets_and_build_times_are_shown() {
     state.report.stale = vec!["shader/pbr/base".to_owned()];
     let ran =
         vec![ActionTime { name: "compile pbr".into(), wall_ms: 12.5, reason: "pbr.wgsl changed".into() }];
-    state.work = Work { ran, reused: 30, plan_ms: 1.0, run_ms: 13.0, ..Default::default() };
+    let work = Work { ran, reused: 30, plan_ms: 1.0, run_ms: 13.0, ..Default::default() };
+    state.receive(&RevisionTable { work, ..Default::default() }, 0.0);
     let harness = harness(state);
     for label in ["stale", "compile pbr", "pbr.wgsl changed", "1 ran, 30 reused, plan 1.0 ms, run 13.0 ms"] {
         assert!(harness.query_by_label(label).is_some(), "`{label}` is not shown");

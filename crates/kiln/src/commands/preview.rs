@@ -18,6 +18,9 @@ use crate::{INPUT_IS_WRONG, place, report};
 /// Width and height of the window when it opens.
 const WINDOW_POINTS: [f32; 2] = [1280.0, 760.0];
 
+/// Folder for pictures, where none is given.
+const PICTURES: &str = "frames";
+
 pub(crate) fn run(args: &PreviewArgs) -> anyhow::Result<ExitCode> {
     let selection = Selection { scene: args.scene.clone(), env: args.env.clone(), ..Selection::default() };
     let view = View { exposure_ev: args.exposure, ..View::default() };
@@ -37,12 +40,15 @@ pub(crate) fn run(args: &PreviewArgs) -> anyhow::Result<ExitCode> {
     }
     let folder = place::project_folder(&args.dir)?;
     let name = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let state = if args.fresh { None } else { place::window_state_file(&folder) };
     run_window(WindowOptions {
         socket,
         title: format!("{name} — Kiln"),
         size: WINDOW_POINTS,
         selection,
         view,
+        pictures: args.out.clone().unwrap_or_else(|| folder.join(PICTURES)),
+        state,
     })?;
     Ok(ExitCode::SUCCESS)
 }
@@ -55,7 +61,7 @@ fn headless(
 ) -> anyhow::Result<ExitCode> {
     let done = run_headless(&HeadlessOptions {
         socket,
-        out: args.out.clone(),
+        out: args.out.clone().unwrap_or_else(|| PICTURES.into()),
         frames: args.frames,
         size: args.size,
         selection,
@@ -89,8 +95,8 @@ fn follow(
     selection: Selection,
     view: View,
 ) -> anyhow::Result<ExitCode> {
-    std::fs::create_dir_all(&args.out)
-        .with_context(|| format!("making the folder {}", args.out.display()))?;
+    let out = args.out.clone().unwrap_or_else(|| PICTURES.into());
+    std::fs::create_dir_all(&out).with_context(|| format!("making the folder {}", out.display()))?;
     let mut viewer = HeadlessViewer::new(Gpu::headless()?, args.size);
     viewer.view = view;
     viewer.select(selection);
@@ -108,7 +114,7 @@ fn follow(
                 let (revision, drawn_unix_ms) = (applied.revision, unix_ms());
                 client.report_frame(FrameReport { revision, received_unix_ms, ready_unix_ms, drawn_unix_ms });
                 report::print_diagnostics(&applied.diagnostics, false);
-                let path = args.out.join(format!("revision_{revision:04}.png"));
+                let path = out.join(format!("revision_{revision:04}.png"));
                 viewer.render()?.save(&path).with_context(|| format!("writing {}", path.display()))?;
                 say!("{}", path.display());
             }

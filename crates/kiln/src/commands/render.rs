@@ -11,8 +11,8 @@ use kiln_gpu::Gpu;
 use kiln_image::sheet::{Shot, shot_sheet};
 use kiln_link::Revision;
 use kiln_preview::{
-    AnimationTime, ApplyReport, Assignment, Channel, DiffuseSource, FaultCounts, HeadlessViewer, PassTime,
-    PixelProbe, Selection,
+    AnimationTime, ApplyReport, Assignment, Channel, DiffuseSource, FaultCounts, HeadlessViewer, Look,
+    LookSheet, PassTime, PixelProbe, Selection,
 };
 use kiln_project::Wishes;
 use kiln_shader::Widget;
@@ -23,13 +23,21 @@ use crate::commands::bake::{progress_bar, show_progress};
 use crate::out::say;
 use crate::{INPUT_IS_WRONG, place, report};
 
+/// Of pictures, where nothing says another.
+const SIZE: [u32; 2] = [1280, 720];
 /// Stands for every scene or environment of the project.
 const ALL: &str = "all";
 
 pub(crate) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
+    let sheet = args.look.as_deref().map(read_sheet).transpose()?;
     let revision = build(args)?;
     let gpu = Gpu::headless().context("opening a graphics device")?;
-    let mut session = Session::new(args, HeadlessViewer::new(gpu, args.size), &revision)?;
+    let size = args.size.or(sheet.as_ref().map(|sheet| sheet.size)).unwrap_or(SIZE);
+    let mut session = Session::new(args, HeadlessViewer::new(gpu, size), &revision)?;
+    if let Some(sheet) = sheet {
+        session.draw_look(&revision, sheet.look)?;
+        return session.finish(&revision);
+    }
     for scene in chosen(&args.scene, &session.offered.scenes, "scene")? {
         for env in chosen(&args.env, &session.offered.envs, "environment")? {
             let variant = args.material_variant.clone();
@@ -42,6 +50,12 @@ pub(crate) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
         }
     }
     session.finish(&revision)
+}
+
+fn read_sheet(path: &Path) -> anyhow::Result<LookSheet> {
+    let text = std::fs::read_to_string(path).map_err(|error| error.to_string());
+    let sheet = text.and_then(|text| LookSheet::read(&text));
+    sheet.map_err(|reason| place::WrongInput(format!("{} cannot be drawn: {reason}", path.display())).into())
 }
 
 fn build(args: &RenderArgs) -> anyhow::Result<Revision> {
@@ -194,6 +208,30 @@ impl<'a> Session<'a> {
         }
     }
 
+    /// What a parameter sheet says; what it names and the project lacks is an error, not another picture.
+    fn draw_look(&mut self, revision: &Revision, look: Look) -> anyhow::Result<()> {
+        let Look { selection, view } = look;
+        self.viewer.view = view;
+        let mut applied = self.viewer.select(selection.clone());
+        if !self.args.param.is_empty() {
+            applied = self.viewer.assign(&self.args.param).map_err(|it| place::WrongInput(it.to_string()))?;
+        }
+        for (what, asked, shown) in [
+            ("scene", &selection.scene, &applied.shown.scene),
+            ("environment", &selection.env, &applied.shown.env),
+            ("material variant", &selection.variant, &applied.shown.variant),
+        ] {
+            if let Some(name) = asked.as_ref().filter(|_| asked != shown) {
+                let reason = format!("the sheet names the {what} `{name}`, which the project does not have");
+                return Err(place::WrongInput(reason).into());
+            }
+        }
+        ensure!(applied.shown.scene.is_some(), "revision {} has no scene to show", revision.table.number);
+        self.notes.extend(applied.notes.iter().cloned());
+        self.diagnostics.extend(applied.diagnostics.iter().cloned());
+        self.draw_frames(&applied, None)
+    }
+
     fn draw_frames(&mut self, applied: &ApplyReport, choice: Option<&str>) -> anyhow::Result<()> {
         let before = self.viewer.view.clone();
         for frame in 1..=self.args.frames {
@@ -201,7 +239,8 @@ impl<'a> Session<'a> {
             self.viewer.view.environment_rotation_rad += self.args.turn.to_radians();
             if let Some(time) = &mut self.viewer.view.animation {
                 // From the first frame on, so that no rounding adds up.
-                time.time_s = self.args.time + frame as f64 / self.args.fps;
+                let first_s = before.animation.map_or(0.0, |first| first.time_s);
+                time.time_s = first_s + frame as f64 / self.args.fps;
             }
         }
         self.viewer.view = before;
