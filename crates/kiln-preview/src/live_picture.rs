@@ -121,10 +121,10 @@ impl LivePicture {
             }
         }
         let inspector = self.renderer.inspector();
-        if let Some(times) = inspector.take_pass_times() {
+        if let Some(times) = inspector.take_pass_times(Duration::ZERO) {
             findings.pass_times = times;
         }
-        if let Some(faults) = inspector.take_faults() {
+        if let Some(faults) = inspector.take_faults(Duration::ZERO) {
             findings.faults = Some(faults);
         }
         findings.scale = self.scaling.moving_scale() as f32;
