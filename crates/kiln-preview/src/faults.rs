@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
 
 use kiln_gpu::Gpu;
 use wgpu::util::{BufferInitDescriptor, DeviceExt as _};
@@ -121,8 +122,9 @@ impl FaultOverlay {
     }
 
     /// The counts of the last counted frame, once, when they are there.
-    pub fn take(&self) -> Option<FaultCounts> {
-        let result = self.pending.borrow().as_ref()?.try_recv().ok()?;
+    /// Waits for them so long.
+    pub fn take(&self, limit: Duration) -> Option<FaultCounts> {
+        let result = self.pending.borrow().as_ref()?.recv_timeout(limit).ok()?;
         self.pending.borrow_mut().take();
         // What cannot be mapped belongs to a lost device.
         result.ok()?;

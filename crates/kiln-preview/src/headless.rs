@@ -9,6 +9,7 @@ use kiln_link::Revision;
 
 use crate::assignment::{Assignment, RefusedParameter};
 use crate::faults::FaultCounts;
+use crate::inspector::ANSWER_LIMIT;
 use crate::pass_timer::PassTime;
 use crate::prepare::Preparer;
 use crate::probe::PixelProbe;
@@ -120,7 +121,7 @@ impl HeadlessViewer {
     /// How long the passes of the last frame took; `None` where the device has no clocks for them. Ask after
     /// [`HeadlessViewer::draw`].
     pub fn take_pass_times(&self) -> Option<Vec<PassTime>> {
-        self.renderer.inspector().take_pass_times()
+        self.renderer.inspector().take_pass_times(ANSWER_LIMIT)
     }
 
     /// Draws a frame and says what it holds at a pixel, column and row from the upper left; `None` outside of it.
@@ -132,8 +133,8 @@ impl HeadlessViewer {
         self.renderer.render(&self.view);
         let Some(pending) = self.renderer.probe(pixel) else { return Ok(None) };
         self.gpu.wait()?;
-        let lost = |_| GpuError::Readback { reason: "the answer never came".to_owned() };
-        pending.take(&self.gpu).map_err(lost)
+        let lost = || GpuError::Readback { reason: "the answer never came".to_owned() };
+        pending.wait().map(Some).ok_or_else(lost)
     }
 
     /// Draws a frame and counts the pixels that [`View::fault_limit`] marks; `None` if it marks none, or the device cannot count.
@@ -142,7 +143,7 @@ impl HeadlessViewer {
     /// [`GpuError::Readback`] when the device is lost.
     pub fn count_faults(&mut self) -> Result<Option<FaultCounts>, GpuError> {
         self.draw()?;
-        Ok(self.renderer.inspector().take_faults())
+        Ok(self.renderer.inspector().take_faults(ANSWER_LIMIT))
     }
 
     /// Whether frames go through a picture of the opaque scene.

@@ -1,6 +1,7 @@
 //! What is found out about frames besides their pictures: times of passes, values of pixels, marks on what is wrong.
 
 use std::cell::{Cell, OnceCell};
+use std::time::Duration;
 
 use glam::Mat4;
 use kiln_gpu::Gpu;
@@ -11,6 +12,9 @@ use crate::inspect::ChannelDisplay;
 use crate::pass_timer::{PassTime, PassTimer};
 use crate::picture::Picture;
 use crate::probe::{PendingProbe, ProbedFrame, Prober};
+
+/// How long an answer of a device that is done may take to be delivered.
+pub(crate) const ANSWER_LIMIT: Duration = Duration::from_secs(10);
 
 /// Makes what it needs when somebody first asks for it.
 #[derive(Debug)]
@@ -69,13 +73,13 @@ impl Inspector {
     }
 
     /// The times of the last timed frame, once, when they are there.
-    pub fn take_pass_times(&self) -> Option<Vec<PassTime>> {
-        self.timer.as_ref()?.take()
+    pub fn take_pass_times(&self, limit: Duration) -> Option<Vec<PassTime>> {
+        self.timer.as_ref()?.take(limit)
     }
 
     /// The counts of the last marked frame, once, when they are there.
-    pub fn take_faults(&self) -> Option<FaultCounts> {
-        self.fault_overlay.get()?.as_ref()?.take()
+    pub fn take_faults(&self, limit: Duration) -> Option<FaultCounts> {
+        self.fault_overlay.get()?.as_ref()?.take(limit)
     }
 
     /// Draws the values of a channel as a picture.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use eframe::egui_wgpu::RenderState;
 use egui::{PointerButton, Rect, Response, Sense, TextureHandle, TextureOptions, Ui, pos2};
@@ -143,10 +143,10 @@ impl LivePicture {
         findings.frame_ms = shown.take_frame_ms().or(findings.frame_ms);
         findings.scale = shown.moving_scale() as f32;
         let inspector = shown.renderer.inspector();
-        if let Some(times) = inspector.take_pass_times() {
+        if let Some(times) = inspector.take_pass_times(Duration::ZERO) {
             findings.pass_times = times;
         }
-        if let Some(faults) = inspector.take_faults() {
+        if let Some(faults) = inspector.take_faults(Duration::ZERO) {
             findings.faults = Some(faults);
         }
     }

@@ -2,6 +2,7 @@
 
 use std::cell::{Cell, RefCell};
 use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
 
 use kiln_gpu::Gpu;
 
@@ -135,8 +136,9 @@ impl PassTimer {
     }
 
     /// The times of the last timed frame, once, when they are there.
-    pub fn take(&self) -> Option<Vec<PassTime>> {
-        let result = self.pending.borrow().as_ref()?.mapped.try_recv().ok()?;
+    /// Waits for them so long.
+    pub fn take(&self, limit: Duration) -> Option<Vec<PassTime>> {
+        let result = self.pending.borrow().as_ref()?.mapped.recv_timeout(limit).ok()?;
         let Pending { passes, .. } = self.pending.borrow_mut().take()?;
         // What cannot be mapped belongs to a lost device.
         result.ok()?;

@@ -7,6 +7,7 @@ use kiln_gpu::Gpu;
 use wgpu::util::{BufferInitDescriptor, DeviceExt as _};
 
 use crate::channel::Channel;
+use crate::inspector::ANSWER_LIMIT;
 
 /// Size of `Answer` in `probe.wgsl`.
 const ANSWER_BYTES: u64 = 48;
@@ -134,6 +135,11 @@ impl Prober {
 }
 
 impl PendingProbe {
+    /// The answer of a device that has done its work: another thread that polls it may still be about to deliver it.
+    pub fn wait(self) -> Option<PixelProbe> {
+        matches!(self.mapped.recv_timeout(ANSWER_LIMIT), Ok(Ok(()))).then(|| self.read())?
+    }
+
     /// The answer: `Err` while it is on its way, `Ok(None)` if it will never come.
     pub fn take(self, gpu: &Gpu) -> Result<Option<PixelProbe>, PendingProbe> {
         // Only moves finished work along; a lost device shows elsewhere.

@@ -27,7 +27,7 @@ pub(super) fn harness(state: PanelState) -> Harness<'static, PanelState> {
         theme::apply(ui.ctx());
         panel::show(ui, state, |_, _| ());
     };
-    let mut harness = Harness::builder().with_size([1280.0, 800.0]).build_ui_state(show, state);
+    let mut harness = Harness::builder().with_size([1280.0, 2400.0]).build_ui_state(show, state);
     harness.run_steps(4);
     harness
 }
