@@ -51,7 +51,7 @@ fn alpha_under(index: u32, perceptual_roughness: f32) -> f32 {
     let alpha = punctual_alpha(perceptual_roughness);
     @if(sun) {
         if index + 1u == light_count() {
-            return max(alpha, 0.5 * sun.angular_radius);
+            return max(alpha, min(0.5 * sun.angular_radius, 1.0));
         }
     }
     return alpha;

@@ -56,7 +56,9 @@ fn arc(
     (0..=steps).map(move |step| {
         let angle = from + (to - from) * step as f64 / steps as f64;
         let out = [libm::cos(angle), libm::sin(angle)];
-        let at = [0, 1].map(|axis| center[axis] + radius.abs() * out[axis]);
+        let [across, height] = [0, 1].map(|axis| center[axis] + radius.abs() * out[axis]);
+        // On the axis it is exactly there, or a pole would be a tiny hole.
+        let at = [if across.abs() < 1e-9 { 0.0 } else { across }, height];
         (at, out.map(|value| value * radius.signum()))
     })
 }
@@ -139,7 +141,11 @@ impl Surface {
         for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
             let corner = |down: usize, right: usize| ((row + down) * (columns + 1) + column + right) as u32;
             let [a, b, c, d] = [corner(0, 0), corner(0, 1), corner(1, 0), corner(1, 1)];
-            self.indices.extend([a, c, b, b, c, d]);
+            // At a pole a row is one point.
+            let at = |corner: u32| self.positions[corner as usize];
+            let has_area = |[a, b, c]: &[u32; 3]| at(*a) != at(*b) && at(*b) != at(*c) && at(*c) != at(*a);
+            let triangles: Vec<[u32; 3]> = [[a, c, b], [b, c, d]].into_iter().filter(has_area).collect();
+            self.indices.extend(triangles.as_flattened());
         }
     }
 

@@ -21,6 +21,14 @@ fn press(harness: &mut Harness<'_, PanelState>, key: Key, shift: bool) {
     harness.run_steps(3);
 }
 
+/// A window in which nothing has to be scrolled to.
+fn tall(state: PanelState) -> Harness<'static, PanelState> {
+    let mut harness = harness(state);
+    harness.set_size(egui::vec2(1280.0, 2400.0));
+    harness.run_steps(4);
+    harness
+}
+
 #[test]
 fn every_key_is_bound_once_and_stands_in_the_help() {
     let keys: BTreeSet<(Key, bool)> = BINDINGS.iter().map(|binding| (binding.key, binding.shift)).collect();
@@ -85,7 +93,7 @@ fn modified_keys_are_not_the_windows() {
 
 #[test]
 fn pinned_picture_is_compared_with_the_live_one_and_freed_again() {
-    let mut harness = harness(state());
+    let mut harness = tall(state());
     press(&mut harness, Key::C, false);
     assert!(!harness.state().compare.is_on, "there is nothing to compare with");
     press(&mut harness, Key::P, false);
@@ -124,7 +132,7 @@ fn any_two_of_live_and_pins_stand_side_by_side() {
     let mut state = state();
     state.pin_as_a();
     state.pin_as_a();
-    let mut harness = harness(state);
+    let mut harness = tall(state);
     harness.get_by_role_and_label(egui::accesskit::Role::ComboBox, "side B").click();
     harness.run_steps(4);
     let title = harness.state().compare.pins[0].title();
