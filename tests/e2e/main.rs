@@ -21,6 +21,7 @@ mod live;
 mod parameters;
 #[cfg(feature = "preview")]
 mod render;
+mod requests;
 mod shader_commands;
 mod shaders;
 mod storms;

@@ -115,6 +115,7 @@ impl Window {
                     self.panels.progress = Some(Progress { done, total, current });
                 }
                 ClientEvent::Revision(revision) => self.receive(revision, unix_ms),
+                ClientEvent::Answer(answer) => panel::requests::receive(&mut self.panels, answer),
             }
         }
         if let Some(ready) = self.worker.take() {
@@ -123,6 +124,7 @@ impl Window {
                 self.connection.want(&ready.prepared.report.shown);
             }
             self.panels.report = ready.prepared.report.clone();
+            self.panels.view.parameters.settle(&self.panels.report.parameters);
             self.picture.replace(ready, is_new);
         }
         if let Some(latency_ms) = self.picture.latency_ms() {
@@ -163,6 +165,7 @@ impl eframe::App for Window {
         self.take_news();
         let Window { panels, picture, .. } = self;
         panel::show(ui, panels, |ui, state| picture.show(ui, state));
+        self.panels.requests.take().into_iter().for_each(|ask| self.connection.request(ask));
         if self.wanted() != self.requested {
             self.request();
         }

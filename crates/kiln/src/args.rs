@@ -5,8 +5,10 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, Parser, Subcommand};
 
 mod shader;
+mod sources;
 
 pub(crate) use shader::*;
+pub(crate) use sources::*;
 
 /// Look-dev without the wait: bakes image-based lighting without noise, checks shaders, and shows every edit
 /// in a live preview.
@@ -50,6 +52,10 @@ pub(crate) enum Command {
     Gc(GcArgs),
     /// Examine the cache, this machine's graphics adapters, and the limits
     Doctor(DoctorArgs),
+    /// Add environments and scenes to a project: copies files, with what they refer to, and names them in kiln.toml
+    Add(AddArgs),
+    /// Write values of parameters into the shaders that declare them, and leave all else as it is
+    Set(SetArgs),
     /// Bake, then follow every edit and publish it to connected previews
     Watch(WatchArgs),
     /// Say whether a project is watched, what is published and building, and what its clients show; exit code 1 if it is not
@@ -425,9 +431,6 @@ pub(crate) struct PreviewArgs {
     /// Exposure in stops
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     pub(crate) exposure: f32,
-    /// What diffuse light is read from: the baked map, or the harmonics, to see what engines show that read these
-    #[arg(long, value_enum, default_value_t = Diffuse::Map)]
-    pub(crate) diffuse: Diffuse,
     /// Set a parameter that a shader's author offers: wetness=0.5, tonemap.tint=1,0.9,0.8, is_lit=false, mode=smooth
     #[arg(long, value_name = "[SHADER.]NAME=VALUE", requires = "headless")]
     pub(crate) param: Vec<kiln_preview::Assignment>,
@@ -482,6 +485,9 @@ pub(crate) struct RenderArgs {
     /// Exposure in stops
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     pub(crate) exposure: f32,
+    /// What diffuse light is read from: the baked map, or the harmonics, to see what engines show that read these
+    #[arg(long, value_enum, default_value_t = Diffuse::Map)]
+    pub(crate) diffuse: Diffuse,
     /// What is behind the scene: environment, checker, or a colour as #rrggbb (sRGB; exposure leaves it, the tone mapper does not)
     #[arg(long, default_value = "environment", value_name = "WHAT")]
     pub(crate) background: kiln_preview::Background,

@@ -11,6 +11,7 @@ use crate::view::{Selection, View};
 
 mod diagnostics;
 mod parameters;
+pub(crate) mod requests;
 mod scene;
 mod side;
 mod surroundings;
@@ -60,6 +61,8 @@ pub(crate) struct PanelState {
     /// How the user wants to see it.
     pub view: View,
     pub playback: Playback,
+    /// What the daemon is asked to do.
+    pub requests: requests::Requests,
 }
 
 impl PanelState {
@@ -78,6 +81,7 @@ impl PanelState {
             selection,
             view,
             playback: Playback::default(),
+            requests: requests::Requests::default(),
         }
     }
 
@@ -86,6 +90,7 @@ impl PanelState {
         self.diagnostics = table.diagnostics.clone();
         self.work = table.work.clone();
         self.progress = None;
+        requests::receive_revision(self, table);
     }
 
     /// The daemon is gone, or there never was one.
@@ -106,6 +111,7 @@ impl PanelState {
 /// Lays the panels out around the picture, which `show_picture` draws in the space left.
 pub(crate) fn show(ui: &mut Ui, state: &mut PanelState, show_picture: impl FnOnce(&mut Ui, &mut PanelState)) {
     scene::play(ui, state);
+    requests::take_dropped(ui, state);
     let bar = Panel::top("top").frame(theme::panel_frame());
     bar.show(ui, |ui| top::show(ui, state));
     let timeline = Panel::bottom("timeline").frame(theme::panel_frame()).resizable(true);
@@ -117,5 +123,6 @@ pub(crate) fn show(ui: &mut Ui, state: &mut PanelState, show_picture: impl FnOnc
         let place = ui.max_rect();
         show_picture(ui, state);
         diagnostics::show_over(ui, place, state);
+        requests::show_over(ui, place, state);
     });
 }

@@ -46,7 +46,7 @@ fn even_light_is_the_same_from_map_and_harmonics_and_other_harmonics_show() {
     // Far above binary16: divided by a power of two, and back.
     let (bright, diagnostics) = with(even(1e7));
     assert_eq!(diagnostics, vec![]);
-    assert!(bright.iter().any(|value| *value == 255));
+    assert!(bright.contains(&255));
 }
 
 #[test]

@@ -12,6 +12,7 @@ mod lights;
 mod panels;
 mod parameters;
 mod pure;
+mod requests;
 mod sun;
 mod swap;
 mod transmission;

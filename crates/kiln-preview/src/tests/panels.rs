@@ -10,7 +10,7 @@ use crate::panel::{self, Connection, PanelState};
 use crate::theme;
 use crate::{AnimationTime, Background, Ground, OfferedAnimation, OfferedParameter, Selection, View};
 
-fn state() -> PanelState {
+pub(super) fn state() -> PanelState {
     let mut state = PanelState::new("llvmpipe, Vulkan".to_owned(), Selection::default(), View::default());
     state.connection = Connection::Connected;
     state.project = "demo".to_owned();
@@ -22,7 +22,7 @@ fn state() -> PanelState {
     state
 }
 
-fn harness(state: PanelState) -> Harness<'static, PanelState> {
+pub(super) fn harness(state: PanelState) -> Harness<'static, PanelState> {
     let show = |ui: &mut egui::Ui, state: &mut PanelState| {
         theme::apply(ui.ctx());
         panel::show(ui, state, |_, _| ());
@@ -120,7 +120,7 @@ fn offered(name: &str, ty: &str, widget: Widget, first: Vec<f64>) -> OfferedPara
     OfferedParameter { shader, name, ty, is_override: false, widget, first, label }
 }
 
-fn state_with_parameters() -> PanelState {
+pub(super) fn state_with_parameters() -> PanelState {
     let mut state = state();
     let names = vec!["flat".to_owned(), "smooth".to_owned()];
     state.report.parameters = vec![
@@ -133,7 +133,7 @@ fn state_with_parameters() -> PanelState {
 }
 
 /// What the parameters of the state are set to.
-fn values(state: &PanelState) -> Vec<Vec<f64>> {
+pub(super) fn values(state: &PanelState) -> Vec<Vec<f64>> {
     state.report.parameters.iter().map(|parameter| state.view.parameters.of(parameter)).collect()
 }
 

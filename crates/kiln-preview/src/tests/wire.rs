@@ -61,7 +61,10 @@ fn headless_run_writes_frames_and_reports_the_first_to_the_daemon() {
                 assert!(report.ready_unix_ms <= report.drawn_unix_ms);
                 break;
             }
-            ServerEvent::Connected { .. } | ServerEvent::Gone { .. } | ServerEvent::StopAsked => {}
+            ServerEvent::Connected { .. }
+            | ServerEvent::Gone { .. }
+            | ServerEvent::StopAsked
+            | ServerEvent::Asked { .. } => {}
         }
     }
 }

@@ -7,12 +7,14 @@ use kiln_image::{Image, ktx2};
 
 use crate::*;
 
+mod add;
 mod config;
 mod demand;
 mod edits;
 mod effects;
 mod outputs;
 mod outside;
+mod write_back;
 
 const TOML: &str = r#"version = 1
 [project]

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use anyhow::Context as _;
 use kiln_daemon::{Daemon, DaemonError, DaemonOptions, Notice, StopHandle};
-use kiln_link::ServerEvent;
+use kiln_link::{Ask, ServerEvent};
 use serde_json::json;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
@@ -89,6 +89,7 @@ impl Screen {
             ServerEvent::Connected { client, name } => say!("client {client} ({name}) connected"),
             ServerEvent::Gone { client, reason } => say!("client {client} left: {reason}"),
             ServerEvent::StopAsked => say!("asked to end"),
+            ServerEvent::Asked { client, request } => say!("client {client} asks to {}", asked(&request.ask)),
             ServerEvent::Frame { client, report } => {
                 let since =
                     if self.noticed_unix_ms > 0.0 { self.noticed_unix_ms } else { self.published_unix_ms };
@@ -111,6 +112,7 @@ fn to_json(notice: &Notice) -> serde_json::Value {
             "event": "published",
             "revision": table.number,
             "work": table.work,
+            "building": table.building,
             "diagnostics": table.diagnostics,
             "targets": table.targets.iter().map(|(name, target)| {
                 (name.clone(), json!({"state": target.state, "sha256": target.digest(), "bytes": target.bytes()}))
@@ -128,5 +130,21 @@ fn to_json(notice: &Notice) -> serde_json::Value {
             json!({"event": "frame", "client": client, "report": report})
         }
         Notice::Client(ServerEvent::StopAsked) => json!({"event": "stop asked"}),
+        Notice::Client(ServerEvent::Asked { client, request }) => {
+            json!({"event": "asked", "client": client, "request": request})
+        }
+    }
+}
+
+/// What a client asks for, after "asks to".
+fn asked(ask: &Ask) -> String {
+    match ask {
+        Ask::WriteParameters { parameters } => {
+            let names: Vec<String> =
+                parameters.iter().map(|write| format!("{}.{}", write.shader, write.name)).collect();
+            format!("write {}", names.join(", "))
+        }
+        Ask::AddFiles { paths } => format!("add {}", paths.join(", ")),
+        Ask::Unknown => "do something that this Kiln does not know".to_owned(),
     }
 }
