@@ -16,6 +16,7 @@ mod faults;
 #[cfg(feature = "preview")]
 mod golden;
 mod harness;
+mod life;
 mod live;
 #[cfg(feature = "preview")]
 mod parameters;
