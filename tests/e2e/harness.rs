@@ -195,10 +195,21 @@ impl Watch {
 
     /// Asks it to end, as Ctrl-C does; returns its exit code.
     #[cfg(unix)]
-    pub fn interrupt(mut self) -> i32 {
-        let pid = self.process.0.id().to_string();
-        assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
+    pub fn interrupt(self) -> i32 {
+        self.end("-INT")
+    }
+
+    /// Sends it a signal that ends it; returns its exit code.
+    #[cfg(unix)]
+    pub fn end(mut self, signal: &str) -> i32 {
+        let pid = self.id().to_string();
+        assert!(Command::new("kill").args([signal, &pid]).status().unwrap().success());
         self.process.0.wait().unwrap().code().unwrap()
+    }
+
+    /// Its process.
+    pub fn id(&self) -> u32 {
+        self.process.0.id()
     }
 }
 
@@ -215,7 +226,8 @@ impl Viewer {
                 ClientEvent::Revision(revision) => return revision,
                 ClientEvent::Connected { .. }
                 | ClientEvent::Disconnected { .. }
-                | ClientEvent::Progress { .. } => {}
+                | ClientEvent::Progress { .. }
+                | ClientEvent::Answer(_) => {}
             }
         }
     }
@@ -225,7 +237,10 @@ impl Viewer {
         loop {
             match self.0.events().recv_timeout(LIMIT).expect("to be disconnected") {
                 ClientEvent::Disconnected { reason } => return reason,
-                ClientEvent::Connected { .. } | ClientEvent::Revision(_) | ClientEvent::Progress { .. } => {}
+                ClientEvent::Connected { .. }
+                | ClientEvent::Revision(_)
+                | ClientEvent::Progress { .. }
+                | ClientEvent::Answer(_) => {}
             }
         }
     }

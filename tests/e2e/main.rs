@@ -18,11 +18,13 @@ mod golden;
 mod harness;
 #[cfg(feature = "preview")]
 mod inspect;
+mod life;
 mod live;
 #[cfg(feature = "preview")]
 mod parameters;
 #[cfg(feature = "preview")]
 mod render;
+mod requests;
 mod shader_commands;
 mod shaders;
 mod storms;

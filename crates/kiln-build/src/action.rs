@@ -87,6 +87,8 @@ pub struct Graph {
     pub(crate) actions: Vec<Action>,
     /// By action: whether its outputs are wanted for themselves.
     pub(crate) wanted: Vec<bool>,
+    /// By action: whether it goes before those that are not; empty if none does.
+    pub(crate) urgent: Vec<bool>,
 }
 
 impl Graph {
@@ -101,6 +103,20 @@ impl Graph {
     /// only for them: while every reader is up to date they may be gone from the store.
     pub fn want(&mut self, id: ActionId) {
         self.wanted[id.0] = true;
+    }
+
+    /// Lets these actions, and all that they read from, go before all others, whatever their ranks; when they are settled
+    /// a run says so ([`crate::Progress::UrgentSettled`]).
+    pub fn hurry(&mut self, first: &[ActionId]) {
+        self.urgent.resize(self.len(), false);
+        for id in self.with_upstream(first) {
+            self.urgent[id.0] = true;
+        }
+    }
+
+    /// Whether an action goes before those that are not urgent.
+    pub(crate) fn is_urgent(&self, index: usize) -> bool {
+        self.urgent.get(index).copied().unwrap_or(false)
     }
 
     /// The action named `id`.
@@ -147,6 +163,7 @@ impl Graph {
             }
             let added = graph.add(action);
             graph.wanted[added.0] = self.wanted[id.0];
+            graph.urgent.push(self.is_urgent(id.0));
         }
         (graph, kept)
     }

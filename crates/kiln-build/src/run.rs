@@ -50,6 +50,11 @@ pub enum Progress<'a> {
         /// Of how many.
         total: usize,
     },
+    /// Every urgent action ([`Graph::hurry`]) is settled, some of them ran, and others are not settled yet.
+    UrgentSettled {
+        /// What is settled so far; the rest is [`Status::NotRun`].
+        report: &'a RunReport,
+    },
 }
 
 /// How an action ended.
@@ -193,8 +198,11 @@ impl Engine {
             let settled = settled.unwrap_or_else(|panic| {
                 Err(Error::Action { action: graph.action(id).name.clone(), reason: panic_text(&*panic) })
             });
-            let done = shared.settle(graph, id, settled, options);
+            let (done, early) = shared.settle(graph, id, settled, options);
             (options.progress)(Progress::Settled { done, total: graph.len() });
+            if let Some(report) = early {
+                (options.progress)(Progress::UrgentSettled { report: &report });
+            }
         }
     }
 
@@ -218,7 +226,7 @@ impl Engine {
         }
         let lengths: Vec<u64> = unperformed.inputs.iter().map(|input| input.bytes).collect();
         let need_bytes = (action.memory)(&lengths);
-        if !shared.enter((action.rank, id.0), need_bytes, options) {
+        if !shared.enter(Place::of(graph, id.0), need_bytes, options) {
             return Ok(Settled { outcome: NOT_RUN, blobs: Vec::new() });
         }
         let _room = Room { shared, need_bytes };
@@ -284,6 +292,20 @@ struct Settled {
     blobs: Vec<Arc<[u8]>>,
 }
 
+/// Where an action stands in a queue; the least is next.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Place {
+    is_late: bool,
+    rank: u32,
+    index: usize,
+}
+
+impl Place {
+    fn of(graph: &Graph, index: usize) -> Place {
+        Place { is_late: !graph.is_urgent(index), rank: graph.actions[index].rank, index }
+    }
+}
+
 /// What the workers share.
 struct Shared {
     progress: Mutex<RunProgress>,
@@ -292,8 +314,8 @@ struct Shared {
 
 #[derive(Default)]
 struct RunProgress {
-    /// (rank, index) of the actions whose inputs are settled.
-    ready: BTreeSet<(u32, usize)>,
+    /// The actions whose inputs are settled.
+    ready: BTreeSet<Place>,
     /// Actions that the survey found due.
     due: HashMap<usize, ActionRecord>,
     /// Number of distinct unsettled actions each waits for.
@@ -303,6 +325,8 @@ struct RunProgress {
     unread_by: Vec<usize>,
     outcomes: Vec<Option<Outcome>>,
     unsettled: usize,
+    /// Urgent ones among them.
+    urgent_unsettled: usize,
     in_flight: usize,
     ended: Vec<ActionId>,
     /// Contents made in this run, so that readers need not go back to the disk.
@@ -310,8 +334,8 @@ struct RunProgress {
     held_bytes: u64,
     /// What the actions at work need together.
     working_bytes: u64,
-    /// (rank, index) of the actions that wait for room; the first of them is the next to get it.
-    waiting_for_room: BTreeSet<(u32, usize)>,
+    /// The actions that wait for room; the first of them is the next to get it.
+    waiting_for_room: BTreeSet<Place>,
     /// Keys of the work that is being done.
     claimed: HashSet<Digest>,
     is_stopped: bool,
@@ -370,11 +394,12 @@ impl Shared {
             };
             if outcome.is_none() {
                 progress.unsettled += 1;
+                progress.urgent_unsettled += usize::from(graph.is_urgent(index));
                 let upstream = distinct_upstream(action);
                 progress.waiting_for[index] =
                     upstream.iter().filter(|&&upstream| progress.outcomes[upstream].is_none()).count();
                 if progress.waiting_for[index] == 0 {
-                    progress.ready.insert((action.rank, index));
+                    progress.ready.insert(Place::of(graph, index));
                 }
                 upstream.into_iter().for_each(|upstream| progress.readers[upstream].push(index));
             }
@@ -396,7 +421,7 @@ impl Shared {
                 self.changed.notify_all();
                 return None;
             }
-            if let Some((_, index)) = progress.ready.pop_first() {
+            if let Some(Place { index, .. }) = progress.ready.pop_first() {
                 progress.in_flight += 1;
                 return Some(ActionId(index));
             }
@@ -439,7 +464,7 @@ impl Shared {
     }
 
     /// Waits for room; false if the run ends instead.
-    fn enter(&self, place: (u32, usize), need_bytes: u64, options: &RunOptions) -> bool {
+    fn enter(&self, place: Place, need_bytes: u64, options: &RunOptions) -> bool {
         let mut progress = lock(&self.progress);
         progress.waiting_for_room.insert(place);
         let may_enter = loop {
@@ -474,18 +499,20 @@ impl Shared {
         declared.collect()
     }
 
-    /// Notes a result and makes its readers ready; returns how many actions are settled.
+    /// Notes a result and makes its readers ready; returns how many actions are settled, and what is known so far if this was
+    /// the last urgent one.
     fn settle(
         &self,
         graph: &Graph,
         id: ActionId,
         settled: Result<Settled, Error>,
         options: &RunOptions,
-    ) -> usize {
+    ) -> (usize, Option<RunReport>) {
         let mut guard = lock(&self.progress);
         let progress = &mut *guard;
         progress.in_flight -= 1;
         progress.unsettled -= 1;
+        progress.urgent_unsettled -= usize::from(graph.is_urgent(id.0));
         match settled {
             Err(Error::Cancelled) => {}
             Err(error) => {
@@ -502,17 +529,28 @@ impl Shared {
                 for reader in std::mem::take(&mut progress.readers[id.0]) {
                     progress.waiting_for[reader] -= 1;
                     if progress.waiting_for[reader] == 0 {
-                        progress.ready.insert((graph.actions[reader].rank, reader));
+                        progress.ready.insert(Place::of(graph, reader));
                     }
                 }
             }
         }
         self.changed.notify_all();
-        graph.len() - progress.unsettled
+        let is_last = graph.is_urgent(id.0) && progress.urgent_unsettled == 0 && progress.unsettled > 0;
+        let goes_on = progress.error.is_none() && !options.cancel.load(Ordering::Relaxed);
+        let early = (is_last && goes_on).then(|| progress.so_far(graph)).flatten();
+        (graph.len() - progress.unsettled, early)
     }
 }
 
 impl RunProgress {
+    /// What is settled, if an urgent action ran.
+    fn so_far(&self, graph: &Graph) -> Option<RunReport> {
+        self.ended.iter().any(|id| graph.is_urgent(id.0)).then(|| RunReport {
+            outcomes: self.outcomes.iter().map(|outcome| outcome.clone().unwrap_or(NOT_RUN)).collect(),
+            ended: self.ended.clone(),
+        })
+    }
+
     /// Keeps contents at hand for those that will read them.
     fn hold(&mut self, id: ActionId, settled: &Settled, held_bytes_max: u64) {
         let Some(record) = settled.outcome.record.as_ref().filter(|_| self.unread_by[id.0] > 0) else {

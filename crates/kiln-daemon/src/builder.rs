@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
-use kiln_build::{ActionId, Digest, Engine, Error, Outcome, RunOptions, Status};
+use kiln_build::{ActionId, Digest, Engine, Error, Outcome, RunOptions, RunReport, Status};
 use kiln_link::{ActionTime, ProgressReport, Revision, RevisionTable, Server, Work};
-use kiln_project::{Built, Wishes, build_with, write_outputs};
+use kiln_project::{Built, Early, Wishes, build_wanted_first, write_outputs};
 
 use crate::watch::Batch;
 
@@ -19,6 +19,8 @@ const TOLD_WITHIN: Duration = Duration::from_millis(700);
 pub(crate) enum BuildResult {
     /// It is done; the table's number is still to be given.
     Done(Box<RevisionTable>),
+    /// What clients want is done, and it goes on.
+    Early(Box<RevisionTable>),
     /// A newer edit came in between; these are the edits that the build was for.
     Cancelled(Batch),
     /// The tool could not do its work; what was published stays.
@@ -63,7 +65,7 @@ impl Builder {
         engine: Arc<Engine>,
         server: Arc<Server>,
         options: BuilderOptions,
-        built: impl Fn(BuildResult) + Send + 'static,
+        built: impl Fn(BuildResult) + Send + Sync + 'static,
     ) -> Builder {
         let (requests, received) = channel();
         let cancel = Arc::new(AtomicBool::new(false));
@@ -97,7 +99,7 @@ struct BuilderThread {
 }
 
 impl BuilderThread {
-    fn run(&self, requests: &Receiver<Batch>, built: &impl Fn(BuildResult)) {
+    fn run(&self, requests: &Receiver<Batch>, built: &(impl Fn(BuildResult) + Sync)) {
         // The watcher tells what changes from here on; before it, anything may have.
         let mut knows_all = false;
         let mut next = None;
@@ -107,7 +109,7 @@ impl BuilderThread {
                 (knows_all && !batch.files.is_empty()).then(|| batch.files.iter().cloned().collect());
             // No collection may take what a build counts on.
             let hold = self.engine.store().hold();
-            match Self::guarded(|| self.build(changed.as_deref())) {
+            match Self::guarded(|| self.build(changed.as_deref(), &batch, built)) {
                 Ok(None) => built(BuildResult::Cancelled(batch)),
                 Ok(Some(done)) => {
                     knows_all = true;
@@ -170,7 +172,12 @@ impl BuilderThread {
         }
     }
 
-    fn build(&self, changed: Option<&[String]>) -> Result<Option<Built>, Error> {
+    fn build(
+        &self,
+        changed: Option<&[String]>,
+        batch: &Batch,
+        built: &(impl Fn(BuildResult) + Sync),
+    ) -> Result<Option<Built>, Error> {
         let (done, total) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let report = |current: &str| {
             let (done, total) = (done.load(Ordering::Relaxed), total.load(Ordering::Relaxed));
@@ -182,6 +189,7 @@ impl BuilderThread {
                 done.store(now, Ordering::Relaxed);
                 total.store(all, Ordering::Relaxed);
             }
+            kiln_build::Progress::UrgentSettled { .. } => {}
         };
         let options = RunOptions {
             jobs: self.options.jobs,
@@ -190,8 +198,21 @@ impl BuilderThread {
             cancel: &self.cancel,
             progress: &progress,
         };
-        let wishes = Wishes::among(self.server.wanted().iter());
-        let result = build_with(&self.engine, changed, wishes, &options);
+        let early = |early: Early| {
+            let Early { targets, building, diagnostics, report, plan_ms, run_ms } = early;
+            let work = noticed(work_of(&report, plan_ms, run_ms), batch.clone());
+            built(BuildResult::Early(Box::new(RevisionTable {
+                number: 0,
+                targets,
+                diagnostics,
+                work,
+                building,
+            })));
+        };
+        let wants = self.server.wanted();
+        let wishes = Wishes::among(wants.targets.iter());
+        let is_wanted = |target: &str| wants.include(target);
+        let result = build_wanted_first(&self.engine, changed, wishes, &is_wanted, &early, &options);
         report("");
         result
     }
@@ -221,17 +242,25 @@ pub fn to_revision(engine: &Engine, built: Built) -> Result<Revision, Error> {
 }
 
 fn to_table(built: Built, batch: Batch) -> RevisionTable {
-    let mut work = to_work(&built);
-    work.changed_files = batch.files.into_iter().collect();
-    work.noticed_unix_ms = batch.noticed_unix_ms;
+    let work = noticed(to_work(&built), batch);
     // Only the engine, which keeps what is published, may have a share in it still.
     let targets = Arc::unwrap_or_clone(built.targets);
-    RevisionTable { number: 0, targets, diagnostics: built.diagnostics, work }
+    RevisionTable { targets, diagnostics: built.diagnostics, work, ..RevisionTable::default() }
+}
+
+/// What a build did because of these edits.
+fn noticed(work: Work, batch: Batch) -> Work {
+    let changed_files = batch.files.into_iter().collect();
+    Work { changed_files, noticed_unix_ms: batch.noticed_unix_ms, ..work }
 }
 
 /// What a build did, as it is published; without the edits that began it, which the build does not know.
 pub fn to_work(built: &Built) -> Work {
-    let time = |id: &ActionId| match built.report.outcome(*id) {
+    work_of(&built.report, built.plan_ms, built.run_ms)
+}
+
+fn work_of(report: &RunReport, plan_ms: f64, run_ms: f64) -> Work {
+    let time = |id: &ActionId| match report.outcome(*id) {
         Outcome { status: Status::Ran { reason }, record: Some(record) } => Some(ActionTime {
             name: record.name.clone(),
             wall_ms: record.result.wall_ms,
@@ -240,10 +269,10 @@ pub fn to_work(built: &Built) -> Work {
         _ => None,
     };
     Work {
-        ran: built.report.ended.iter().filter_map(time).collect(),
-        reused: built.report.reused_count(),
-        plan_ms: built.plan_ms,
-        run_ms: built.run_ms,
+        ran: report.ended.iter().filter_map(time).collect(),
+        reused: report.reused_count(),
+        plan_ms,
+        run_ms,
         ..Work::default()
     }
 }

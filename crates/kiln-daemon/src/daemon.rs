@@ -12,6 +12,7 @@ use kiln_link::{LockError, ProjectLock, RevisionTable, Server, ServerEvent, sock
 use kiln_project::Wishes;
 
 use crate::builder::{BuildResult, Builder, BuilderOptions};
+use crate::requests::Requests;
 use crate::watch::{Batch, UNFINISHED, Watch, send_batches, unix_ms};
 
 /// How to serve a project.
@@ -126,6 +127,7 @@ pub struct Daemon {
     relevant_version: u64,
     /// What clients wished for when the last build began.
     built_for: Wishes,
+    requests: Requests,
     _lock: ProjectLock,
 }
 
@@ -166,6 +168,7 @@ impl Daemon {
             // Fails only when the daemon has ended.
             let _ = built.send(Event::Built(result));
         });
+        let requests = Requests::start(engine.clone(), server.clone());
         let mut daemon = Daemon {
             events,
             stop: StopHandle(sender),
@@ -181,6 +184,7 @@ impl Daemon {
             relevant: Vec::new(),
             relevant_version: 0,
             built_for: Wishes::default(),
+            requests,
             _lock: lock,
         };
         daemon.begin_build(Batch::default());
@@ -205,6 +209,9 @@ impl Daemon {
                 Event::Stop => return self.builder.cancel(),
                 Event::Client(event) => {
                     let is_stop = event == ServerEvent::StopAsked;
+                    if let ServerEvent::Asked { client, request } = &event {
+                        self.requests.ask(*client, request.clone());
+                    }
                     notify(Notice::Client(event));
                     if is_stop {
                         return self.builder.cancel();
@@ -218,6 +225,7 @@ impl Daemon {
                     }
                 }
                 Event::Files(batch) => self.take_files(batch, notify),
+                Event::Built(BuildResult::Early(table)) => self.publish_early(*table, notify),
                 Event::Built(result) => self.end_build(result, notify),
             }
         }
@@ -255,7 +263,7 @@ impl Daemon {
     }
 
     fn wishes(&self) -> Wishes {
-        Wishes::among(self.server.wanted().iter())
+        Wishes::among(self.server.wanted().targets.iter())
     }
 
     /// Builds anew if clients want something else than the last build was for.
@@ -289,7 +297,7 @@ impl Daemon {
                 return self.take_files(Batch::now(self.watch.with_other_names(files.clone())), notify);
             }
             BuildResult::Cancelled(batch) => batch.clone(),
-            BuildResult::Done(_) | BuildResult::Failed(_) => Batch::default(),
+            BuildResult::Done(_) | BuildResult::Early(_) | BuildResult::Failed(_) => Batch::default(),
         };
         unseen.merge(self.building.take().unwrap_or_default());
         self.server.set_building(None);
@@ -318,7 +326,10 @@ impl Daemon {
                 self.publish(table, notify);
             }
             BuildResult::Failed(error) => notify(Notice::Failed(error.to_string())),
-            BuildResult::Cancelled(_) | BuildResult::OutputsFailed(_) | BuildResult::Overlooked(_) => {}
+            BuildResult::Cancelled(_)
+            | BuildResult::Early(_)
+            | BuildResult::OutputsFailed(_)
+            | BuildResult::Overlooked(_) => {}
         }
         if !unseen.files.is_empty() {
             notify(Notice::Building { files: unseen.files.iter().cloned().collect() });
@@ -346,12 +357,31 @@ impl Daemon {
         table
     }
 
+    /// Publishes what clients want while the rest is still being made. What a newer edit makes void, and what may be half
+    /// written, waits for the end of the build.
+    fn publish_early(&mut self, mut table: RevisionTable, notify: &mut dyn FnMut(Notice)) {
+        let is_newest = self.building.as_ref().is_some_and(|unseen| unseen.files.is_empty());
+        let Some(last) = self.published.clone().filter(|_| is_newest) else { return };
+        if !hide_errors_of(&mut table, &last, &self.watch.being_written()).is_empty() {
+            return;
+        }
+        // What is still being made may have the faults that it had.
+        let is_old = |fault: &&Diagnostic| {
+            let is_of_edit = fault.file.as_ref().is_some_and(|file| table.work.changed_files.contains(file));
+            !is_of_edit && !table.diagnostics.contains(fault)
+        };
+        let old: Vec<Diagnostic> = last.diagnostics.iter().filter(is_old).cloned().collect();
+        table.diagnostics.extend(old);
+        self.publish(table, notify);
+    }
+
     fn publish(&mut self, mut table: RevisionTable, notify: &mut dyn FnMut(Notice)) {
         let is_incomplete = std::mem::take(&mut self.is_incomplete);
         if let Some(last) = &self.published
             && !is_incomplete
             && last.targets == table.targets
             && last.diagnostics == table.diagnostics
+            && last.building == table.building
         {
             return notify(Notice::Unchanged { files: table.work.changed_files });
         }

@@ -31,7 +31,7 @@ fn print_revisions(folder: &Path, count: usize) -> std::io::Result<()> {
         match client.events().recv() {
             Ok(ClientEvent::Connected { project }) => println!("connected to {project}"),
             Ok(ClientEvent::Disconnected { reason }) => println!("waiting: {reason}"),
-            Ok(ClientEvent::Progress { .. }) => {}
+            Ok(ClientEvent::Progress { .. } | ClientEvent::Answer(_)) => {}
             Ok(ClientEvent::Revision(revision)) => {
                 println!("{}", line(&revision));
                 printed += 1;

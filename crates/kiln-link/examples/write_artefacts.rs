@@ -34,7 +34,7 @@ fn newest_revision(folder: &Path) -> std::io::Result<Arc<Revision>> {
         match event {
             ClientEvent::Revision(revision) => return Ok(revision),
             ClientEvent::Disconnected { reason } => return Err(std::io::Error::other(reason)),
-            ClientEvent::Connected { .. } | ClientEvent::Progress { .. } => {}
+            ClientEvent::Connected { .. } | ClientEvent::Progress { .. } | ClientEvent::Answer(_) => {}
         }
     }
     Err(std::io::Error::other("the client has ended"))

@@ -1,5 +1,6 @@
 //! A client that stays connected: whole revisions in, frame reports out.
 
+use std::collections::BTreeSet;
 use std::io::{Read as _, Write as _};
 use std::net::Shutdown;
 use std::os::unix::net::UnixStream;
@@ -8,10 +9,14 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use kiln_diagnostic::Diagnostic;
+
+use crate::request::REQUESTS_MAX;
 use crate::session::ClientSession;
 use crate::wire::Message as _;
 use crate::{
-    ClientMessage, Decoder, FrameReport, Hello, Revision, ServerMessage, Wants, capability, transport,
+    Answer, Ask, ClientMessage, Decoder, FrameReport, Hello, Request, Revision, ServerMessage, Wants,
+    capability, transport,
 };
 
 /// How long a client waits before it looks for a daemon again.
@@ -41,6 +46,8 @@ pub enum ClientEvent {
         /// What runs now; empty when the build has ended.
         current: String,
     },
+    /// What became of a request; of one that was open when the connection ended, that this is not known.
+    Answer(Answer),
 }
 
 /// A connection that is made again whenever it breaks, until the client is dropped.
@@ -94,15 +101,47 @@ impl Client {
         self.lock_writer().send(&ClientMessage::Frame(report));
     }
 
-    fn lock_writer(&self) -> MutexGuard<'_, Writer> {
-        self.writer.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Asks the daemon to change the project; a [`ClientEvent::Answer`] of the returned number says what became of it.
+    ///
+    /// # Errors
+    /// There is no daemon, it takes no requests, or too many are open; the text says so.
+    pub fn request(&self, ask: Ask) -> Result<u64, Box<Diagnostic>> {
+        let mut writer = self.lock_writer();
+        if writer.stream.is_none() {
+            return Err(Diagnostic::error("there is no daemon to do this")
+                .with_help("start one with `kiln watch`")
+                .into());
+        }
+        if !writer.takes_requests {
+            let fault = Diagnostic::error("this daemon is older and takes no requests");
+            return Err(fault.with_help("end it with `kiln stop` and start it again").into());
+        }
+        if writer.open_requests.len() >= REQUESTS_MAX {
+            return Err(
+                Diagnostic::error(format!("{REQUESTS_MAX} requests wait for their answer already")).into()
+            );
+        }
+        ask.check().map_err(Diagnostic::error)?;
+        writer.last_request += 1;
+        let id = writer.last_request;
+        writer.open_requests.insert(id);
+        writer.send(&ClientMessage::Request(Request { id, ask }));
+        Ok(id)
     }
+
+    fn lock_writer(&self) -> MutexGuard<'_, Writer> {
+        lock(&self.writer)
+    }
+}
+
+fn lock(writer: &Mutex<Writer>) -> MutexGuard<'_, Writer> {
+    writer.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Drop for Client {
     fn drop(&mut self) {
         drop(self.stop.take());
-        let mut writer = self.writer.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut writer = self.lock_writer();
         writer.is_closed = true;
         if let Some(stream) = &writer.stream {
             // Wakes the reading thread; the stream may be broken already.
@@ -125,6 +164,12 @@ struct Writer {
     wants: Wants,
     pinged: Option<(u64, Instant)>,
     round_trip: Option<Duration>,
+    /// Whether the daemon does.
+    takes_requests: bool,
+    /// The newest request's number.
+    last_request: u64,
+    /// Requests without an answer.
+    open_requests: BTreeSet<u64>,
 }
 
 impl Writer {
@@ -155,6 +200,10 @@ struct Talk {
 }
 
 impl Talk {
+    fn lock_writer(&self) -> MutexGuard<'_, Writer> {
+        lock(&self.writer)
+    }
+
     fn run(self, stopped: &Receiver<()>) {
         let mut session = ClientSession::default();
         let mut said: Option<String> = None;
@@ -163,7 +212,9 @@ impl Talk {
                 Ok(stream) => (true, self.talk(stream, &mut session)),
                 Err(error) => (false, describe_open_error(&self.socket, &error)),
             };
-            self.writer.lock().unwrap_or_else(PoisonError::into_inner).stream = None;
+            if !self.close_requests() {
+                return;
+            }
             if was_connected || said.as_ref() != Some(&reason) {
                 said = Some(reason.clone());
                 if self.events.send(ClientEvent::Disconnected { reason }).is_err() {
@@ -177,12 +228,25 @@ impl Talk {
         }
     }
 
+    /// Gives up the connection, and says that nobody will answer what is open. Whether anybody listens.
+    fn close_requests(&self) -> bool {
+        let mut writer = self.lock_writer();
+        (writer.stream, writer.takes_requests) = (None, false);
+        let open = std::mem::take(&mut writer.open_requests);
+        drop(writer);
+        open.into_iter().all(|id| {
+            let lost = Diagnostic::error("the connection ended before the daemon answered")
+                .with_help("look whether it was done, and ask again if it was not");
+            self.events.send(ClientEvent::Answer(Answer::refused(id, lost))).is_ok()
+        })
+    }
+
     fn open(&self) -> std::io::Result<UnixStream> {
         let mut stream = UnixStream::connect(&self.socket)?;
         transport::check_peer(&stream)?;
         let hello = ClientMessage::Hello(Hello::new(&self.name, &[capability::REVISIONS]));
         stream.write_all(&hello.encode())?;
-        let mut writer = self.writer.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut writer = self.lock_writer();
         if writer.is_closed {
             return Err(std::io::Error::other("the client has ended"));
         }
@@ -216,16 +280,23 @@ impl Talk {
             decoder.next_message::<ServerMessage>().map_err(|error| error.to_string())?
         {
             let reaction = session.receive(message)?;
-            let mut writer = self.writer.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut writer = self.lock_writer();
             if let Some(number) = reaction.pong {
                 writer.take_pong(number);
             }
+            writer.takes_requests = reaction.takes_requests.unwrap_or(writer.takes_requests);
             for message in reaction.send {
                 let stream = writer.stream.as_mut().ok_or("the connection is closing")?;
                 stream.write_all(&message.encode()).map_err(|error| error.to_string())?;
             }
             drop(writer);
             for event in reaction.events {
+                // An answer to nothing is passed over.
+                if let ClientEvent::Answer(answer) = &event
+                    && !self.lock_writer().open_requests.remove(&answer.id)
+                {
+                    continue;
+                }
                 self.events.send(event).map_err(|_| "the client has ended".to_owned())?;
             }
         }

@@ -7,7 +7,8 @@ use std::time::{Duration, Instant};
 
 use crate::wire::Message as _;
 use crate::{
-    ClientMessage, DaemonStatus, Decoder, Hello, PROTOCOL_VERSION, ProjectLock, ServerMessage, transport,
+    Answer, Ask, ClientMessage, DaemonStatus, Decoder, Hello, PROTOCOL_VERSION, ProjectLock, Request,
+    ServerMessage, capability, transport,
 };
 
 /// Why a daemon did not answer.
@@ -30,6 +31,9 @@ pub enum ControlError {
         /// Its version.
         theirs: u32,
     },
+    /// It takes no requests.
+    #[error("the daemon is older and takes no requests: end it with `kiln stop` and start it again")]
+    NoRequests,
     /// It broke the protocol.
     #[error("the daemon does not speak the protocol: {0}")]
     Protocol(String),
@@ -54,6 +58,25 @@ pub fn status(socket: &Path, limit: Duration) -> Result<DaemonStatus, ControlErr
     }
 }
 
+/// Asks the daemon behind `socket` to change the project.
+///
+/// # Errors
+/// There is none, it takes no requests, or it does not answer within `limit`.
+pub fn ask(socket: &Path, ask: Ask, limit: Duration) -> Result<Answer, ControlError> {
+    let mut talk = Talk::open(socket, "answer", limit)?;
+    if !talk.takes_requests {
+        return Err(ControlError::NoRequests);
+    }
+    talk.stream.write_all(&ClientMessage::Request(Request { id: 1, ask }).encode())?;
+    loop {
+        match talk.next()? {
+            Some(ServerMessage::Answer(answer)) => return Ok(answer),
+            Some(_) => {}
+            None => return Err(ControlError::Protocol("it hung up without an answer".to_owned())),
+        }
+    }
+}
+
 /// Ends the daemon behind `socket` and waits until it is gone: its socket, its lock, and all that it was writing.
 ///
 /// # Errors
@@ -71,6 +94,7 @@ struct Talk {
     what: &'static str,
     limit: Duration,
     deadline: Instant,
+    takes_requests: bool,
 }
 
 impl Talk {
@@ -82,11 +106,14 @@ impl Talk {
         })?;
         transport::check_peer(&stream)?;
         stream.set_write_timeout(Some(limit))?;
-        let mut talk =
-            Talk { stream, decoder: Decoder::default(), what, limit, deadline: Instant::now() + limit };
+        let (decoder, deadline) = (Decoder::default(), Instant::now() + limit);
+        let mut talk = Talk { stream, decoder, what, limit, deadline, takes_requests: false };
         talk.stream.write_all(&ClientMessage::Hello(Hello::new("control", &[])).encode())?;
         match talk.next()? {
-            Some(ServerMessage::Hello(hello)) if hello.protocol == PROTOCOL_VERSION => Ok(talk),
+            Some(ServerMessage::Hello(hello)) if hello.protocol == PROTOCOL_VERSION => {
+                talk.takes_requests = hello.can(capability::REQUESTS);
+                Ok(talk)
+            }
             Some(ServerMessage::Hello(hello)) => Err(ControlError::Version { theirs: hello.protocol }),
             _ => Err(ControlError::Protocol("it did not begin with a greeting".to_owned())),
         }

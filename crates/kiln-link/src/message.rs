@@ -3,15 +3,17 @@
 use kiln_build::Digest;
 use serde::{Deserialize, Serialize};
 
-use crate::{DaemonStatus, RevisionTable};
+use crate::{Answer, DaemonStatus, Request, RevisionTable};
 
 /// Raised whenever an old peer would misunderstand a new one; both sides must have the same.
 pub const PROTOCOL_VERSION: u32 = 2;
 
-/// What a client may be capable of.
+/// What a client or a daemon may be capable of.
 pub mod capability {
     /// It follows revisions: the daemon tells it tables and progress. Without it a client only asks.
     pub const REVISIONS: &str = "revisions";
+    /// Of a daemon: it changes the project's sources for a client that asks ([`crate::Request`]).
+    pub const REQUESTS: &str = "requests";
 }
 
 /// What a client says.
@@ -33,6 +35,9 @@ pub enum ClientMessage {
     Status,
     /// Asks the daemon to end.
     Stop,
+    /// Asks for a change of the project; answered by a [`ServerMessage::Answer`]. Only to daemons with
+    /// [`capability::REQUESTS`].
+    Request(Request),
 }
 
 /// What a daemon says.
@@ -64,6 +69,8 @@ pub enum ServerMessage {
     Pong(u64),
     /// How the daemon is.
     Status(Box<DaemonStatus>),
+    /// What became of a request.
+    Answer(Answer),
 }
 
 /// How a talk begins.

@@ -1,8 +1,9 @@
 //! What one client still has to be told, and the thread that tells it.
 //!
 //! Its size has a bound whatever the client does: at most one message of each kind waits, and newer ones replace older ones; contents
-//! wait as digests ([`SendQueue`]).
+//! wait as digests ([`SendQueue`]), and answers are as few as open requests may be.
 
+use std::collections::VecDeque;
 use std::io::Write as _;
 use std::net::Shutdown;
 use std::os::unix::net::UnixStream;
@@ -12,7 +13,7 @@ use std::time::Instant;
 use crate::queue::{SendQueue, Step};
 use crate::server::BlobSource;
 use crate::wire::{Message as _, chunk_header, encode_revision};
-use crate::{ClientStatus, DaemonStatus, ProgressReport, RevisionTable, ServerMessage};
+use crate::{Answer, ClientStatus, DaemonStatus, ProgressReport, RevisionTable, ServerMessage};
 
 pub(crate) struct Outbox {
     state: Mutex<OutboxState>,
@@ -31,13 +32,17 @@ pub(crate) struct OutboxState {
     pub(crate) facts: ClientStatus,
     /// Whether it follows revisions.
     pub(crate) follows: bool,
+    /// What became of its requests: no more than [`crate::request::REQUESTS_MAX`].
+    pub(crate) answers: VecDeque<Answer>,
+    /// Requests whose answer is not yet written.
+    pub(crate) open_requests: usize,
     ping: Option<u64>,
     pinged: Option<(u64, Instant)>,
     closed: bool,
 }
 
 /// What is written in one go.
-enum Turn {
+pub(crate) enum Turn {
     Message(ServerMessage),
     Table(Arc<RevisionTable>),
     Content(Step),
@@ -61,7 +66,7 @@ impl OutboxState {
     }
 
     /// The most urgent turn.
-    fn next(&mut self) -> Option<Turn> {
+    pub(crate) fn next(&mut self) -> Option<Turn> {
         if let Some(number) = self.pong.take() {
             return Some(Turn::Message(ServerMessage::Pong(number)));
         }
@@ -71,6 +76,10 @@ impl OutboxState {
         }
         if let Some(status) = self.status.take() {
             return Some(Turn::Message(ServerMessage::Status(status)));
+        }
+        if let Some(answer) = self.answers.pop_front() {
+            self.open_requests = self.open_requests.saturating_sub(1);
+            return Some(Turn::Message(ServerMessage::Answer(answer)));
         }
         if let Some(table) = self.table.take() {
             self.queue.tell(table.clone());

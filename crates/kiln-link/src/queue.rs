@@ -133,6 +133,9 @@ impl SendQueue {
 
     fn rank_anew(&mut self) {
         self.ranks = ranks(&self.table, &self.wants);
+        // What this table names again is not missing: whoever was told so after it would give the table up.
+        let missing = std::mem::take(&mut self.missing);
+        self.fetch(missing);
         for ((_, digest), begun) in std::mem::take(&mut self.waiting) {
             match self.ranks.get(&digest) {
                 Some(rank) => _ = self.waiting.insert((*rank, digest), begun),

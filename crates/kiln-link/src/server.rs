@@ -13,10 +13,11 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use kiln_build::{Digest, TargetState};
 
 use crate::outbox::Outbox;
+use crate::request::REQUESTS_MAX;
 use crate::wire::{FETCH_DIGESTS_MAX, Message as _};
 use crate::{
-    BuildStatus, ClientMessage, ClientStatus, DaemonStatus, Decoder, FrameReport, Hello, PROTOCOL_VERSION,
-    ProgressReport, RevisionTable, ServerMessage, capability, transport,
+    Answer, BuildStatus, ClientMessage, ClientStatus, DaemonStatus, Decoder, FrameReport, Hello,
+    PROTOCOL_VERSION, ProgressReport, Request, RevisionTable, ServerMessage, Wants, capability, transport,
 };
 
 /// Connections at once.
@@ -60,6 +61,13 @@ pub enum ServerEvent {
     },
     /// Somebody asked the daemon to end.
     StopAsked,
+    /// Somebody asked for a change of the project; [`Server::answer`] it.
+    Asked {
+        /// Who.
+        client: u64,
+        /// What.
+        request: Request,
+    },
 }
 
 /// A listening socket and its clients.
@@ -119,7 +127,7 @@ impl Server {
 
     /// Says for [`DaemonStatus`] which files' change is being built; `None` when nothing is.
     pub fn set_building(&self, files: Option<Vec<String>>) {
-        let status = |files| BuildStatus { files, progress: ProgressReport::default() };
+        let status = |files| BuildStatus { files, ..BuildStatus::default() };
         *lock(&self.shared.building) = files.map(status);
     }
 
@@ -131,15 +139,24 @@ impl Server {
         self.tell_followers(|outbox| outbox.update(|state| state.progress = Some(progress.clone())));
     }
 
+    /// Tells a client what became of its request. If it is gone nobody hears of it.
+    pub fn answer(&self, client: u64, answer: Answer) {
+        let outbox = lock(&self.shared.clients).get(&client).cloned();
+        if let Some(outbox) = outbox {
+            outbox.update(|state| state.answers.push_back(answer));
+        }
+    }
+
     /// How this daemon is.
     pub fn status(&self) -> DaemonStatus {
         self.shared.status()
     }
 
-    /// What the clients show, as far as they said.
-    pub fn wanted(&self) -> BTreeSet<String> {
+    /// What the clients show, as far as they said: each target once.
+    pub fn wanted(&self) -> Wants {
         let wants = |outbox: &Arc<Outbox>| outbox.state().queue.wants().targets.clone();
-        lock(&self.shared.clients).values().flat_map(wants).collect()
+        let targets: BTreeSet<String> = lock(&self.shared.clients).values().flat_map(wants).collect();
+        Wants { targets: targets.into_iter().collect() }
     }
 
     fn tell_followers(&self, tell: impl Fn(&Outbox)) {
@@ -175,6 +192,8 @@ impl Shared {
             ..DaemonStatus::default()
         };
         let Some(table) = lock(&self.latest).clone() else { return status };
+        let building =
+            status.building.map(|building| BuildStatus { targets: table.building.clone(), ..building });
         let is_stale = |name: &&String| table.targets[*name].state == TargetState::Stale;
         DaemonStatus {
             revision: table.number,
@@ -182,6 +201,7 @@ impl Shared {
             targets: table.targets.len(),
             stale: table.targets.keys().filter(is_stale).cloned().collect(),
             errors: table.diagnostics.iter().filter(|diagnostic| diagnostic.is_error()).cloned().collect(),
+            building,
             ..status
         }
     }
@@ -268,7 +288,8 @@ fn greet(
     mut stream: UnixStream,
     hello: Hello,
 ) -> Result<(), String> {
-    let answer = ServerMessage::Hello(Hello::new(&shared.project, &[capability::REVISIONS]));
+    let answer =
+        ServerMessage::Hello(Hello::new(&shared.project, &[capability::REVISIONS, capability::REQUESTS]));
     stream.write_all(&answer.encode()).map_err(|error| error.to_string())?;
     if hello.protocol != PROTOCOL_VERSION {
         return Err(format!("it speaks protocol {}, this daemon {PROTOCOL_VERSION}", hello.protocol));
@@ -323,6 +344,15 @@ fn receive(shared: &Shared, client: u64, outbox: &Outbox, message: ClientMessage
             outbox.update(|state| state.status = Some(Box::new(status)));
         }
         ClientMessage::Stop => (shared.events)(ServerEvent::StopAsked),
+        ClientMessage::Request(request) => {
+            let mut state = outbox.state();
+            state.open_requests += 1;
+            if state.open_requests > REQUESTS_MAX {
+                return Err(format!("it asked for more than {REQUESTS_MAX} things at once"));
+            }
+            drop(state);
+            (shared.events)(ServerEvent::Asked { client, request });
+        }
     }
     Ok(())
 }

@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use kiln_build::Digest;
 
-use crate::{ClientEvent, ClientMessage, Hello, PROTOCOL_VERSION, Revision, RevisionTable, ServerMessage};
+use crate::{
+    ClientEvent, ClientMessage, Hello, PROTOCOL_VERSION, Revision, RevisionTable, ServerMessage, capability,
+};
 
 /// Turns what the daemon says into requests and whole revisions. Contents survive a reconnection, so that a
 /// client that has everything fetches nothing.
@@ -27,6 +29,8 @@ pub(crate) struct Reaction {
     pub(crate) events: Vec<ClientEvent>,
     /// The daemon answered the ping of this number.
     pub(crate) pong: Option<u64>,
+    /// The daemon greeted: whether it takes requests.
+    pub(crate) takes_requests: Option<bool>,
 }
 
 impl ClientSession {
@@ -45,7 +49,9 @@ impl ClientSession {
     pub(crate) fn receive(&mut self, message: ServerMessage) -> Result<Reaction, String> {
         let mut reaction = Reaction::default();
         match message {
-            ServerMessage::Hello(Hello { protocol, name: project, .. }) => {
+            ServerMessage::Hello(hello) => {
+                reaction.takes_requests = Some(hello.can(capability::REQUESTS));
+                let Hello { protocol, name: project, .. } = hello;
                 if protocol != PROTOCOL_VERSION {
                     return Err(format!(
                         "the daemon speaks protocol {protocol}, this client {PROTOCOL_VERSION}: update the older one"
@@ -81,6 +87,7 @@ impl ClientSession {
             ServerMessage::Pong(number) => reaction.pong = Some(number),
             // Nobody asked here.
             ServerMessage::Status(_) => {}
+            ServerMessage::Answer(answer) => reaction.events.push(ClientEvent::Answer(answer)),
         }
         Ok(reaction)
     }

@@ -37,6 +37,9 @@ pub struct BuildStatus {
     pub files: Vec<String>,
     /// How far it is.
     pub progress: ProgressReport,
+    /// Targets that it still makes, while what clients want is published; empty before that.
+    #[serde(default)]
+    pub targets: Vec<String>,
 }
 
 /// A client as the daemon knows it.

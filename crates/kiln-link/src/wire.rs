@@ -11,7 +11,8 @@ use kiln_build::Digest;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    ClientMessage, DaemonStatus, FrameReport, Hello, ProgressReport, RevisionTable, ServerMessage, Wants,
+    Answer, ClientMessage, DaemonStatus, FrameReport, Hello, ProgressReport, Request, RevisionTable,
+    ServerMessage, Wants,
 };
 
 /// Longest frame of a daemon: room for a revision table of 100 000 targets.
@@ -41,6 +42,7 @@ const CLIENT_PING: u8 = 5;
 const CLIENT_PONG: u8 = 6;
 const CLIENT_STATUS: u8 = 7;
 const CLIENT_STOP: u8 = 8;
+const CLIENT_REQUEST: u8 = 9;
 const SERVER_HELLO: u8 = 65;
 const SERVER_REVISION: u8 = 66;
 const SERVER_CHUNK: u8 = 67;
@@ -49,6 +51,7 @@ const SERVER_PROGRESS: u8 = 69;
 const SERVER_PING: u8 = 70;
 const SERVER_PONG: u8 = 71;
 const SERVER_STATUS: u8 = 72;
+const SERVER_ANSWER: u8 = 73;
 
 /// The peer does not speak this protocol.
 #[derive(Debug, thiserror::Error)]
@@ -170,6 +173,12 @@ fn parse_wants(kind: u8, payload: &[u8]) -> Result<Wants, WireError> {
     Ok(wants)
 }
 
+fn parse_request(kind: u8, payload: &[u8]) -> Result<Request, WireError> {
+    let request: Request = parse(kind, payload)?;
+    request.ask.check().map_err(|reason| malformed(kind, reason))?;
+    Ok(request)
+}
+
 impl Message for ClientMessage {
     const FRAME_BYTES_MAX: usize = CLIENT_FRAME_BYTES_MAX;
 
@@ -183,6 +192,7 @@ impl Message for ClientMessage {
             ClientMessage::Pong(number) => frame(CLIENT_PONG, &[&number.to_le_bytes()]),
             ClientMessage::Status => frame(CLIENT_STATUS, &[]),
             ClientMessage::Stop => frame(CLIENT_STOP, &[]),
+            ClientMessage::Request(request) => json_frame(CLIENT_REQUEST, request),
         }
     }
 
@@ -196,6 +206,7 @@ impl Message for ClientMessage {
             CLIENT_PONG => Ok(ClientMessage::Pong(parse_number(kind, payload)?)),
             CLIENT_STATUS => Ok(ClientMessage::Status),
             CLIENT_STOP => Ok(ClientMessage::Stop),
+            CLIENT_REQUEST => Ok(ClientMessage::Request(parse_request(kind, payload)?)),
             other => Err(WireError::Type(other)),
         }
     }
@@ -217,6 +228,7 @@ impl Message for ServerMessage {
             ServerMessage::Ping(number) => frame(SERVER_PING, &[&number.to_le_bytes()]),
             ServerMessage::Pong(number) => frame(SERVER_PONG, &[&number.to_le_bytes()]),
             ServerMessage::Status(status) => json_frame(SERVER_STATUS, status),
+            ServerMessage::Answer(answer) => json_frame(SERVER_ANSWER, answer),
         }
     }
 
@@ -230,6 +242,7 @@ impl Message for ServerMessage {
             SERVER_PING => Ok(ServerMessage::Ping(parse_number(kind, payload)?)),
             SERVER_PONG => Ok(ServerMessage::Pong(parse_number(kind, payload)?)),
             SERVER_STATUS => Ok(ServerMessage::Status(Box::new(parse::<DaemonStatus>(kind, payload)?))),
+            SERVER_ANSWER => Ok(ServerMessage::Answer(parse::<Answer>(kind, payload)?)),
             other => Err(WireError::Type(other)),
         }
     }

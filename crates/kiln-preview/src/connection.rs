@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel}
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use kiln_link::{Client, ClientEvent, FrameReport};
+use kiln_link::{Answer, Ask, Client, ClientEvent, FrameReport};
 
 use crate::worker::unix_ms;
 
@@ -28,6 +28,7 @@ pub(crate) struct Connection {
     reports: Option<Sender<FrameReport>>,
     wants: Sender<Vec<String>>,
     thread: Option<JoinHandle<()>>,
+    requests: Sender<Ask>,
 }
 
 impl Connection {
@@ -36,11 +37,17 @@ impl Connection {
         let (sender, heard) = channel();
         let (reports, reported) = channel();
         let (wants, wanted) = channel();
+        let (requests, asked) = channel();
         let thread = std::thread::Builder::new().name("link".into());
         let thread = thread.spawn(move || {
-            forward(&Client::connect(socket, "preview, window"), &sender, &Told { reported, wanted }, wake);
+            forward(
+                &Client::connect(socket, "preview, window"),
+                &sender,
+                &Told { reported, wanted, asked },
+                wake,
+            );
         })?;
-        Ok(Connection { heard, reports: Some(reports), wants, thread: Some(thread) })
+        Ok(Connection { heard, reports: Some(reports), wants, thread: Some(thread), requests })
     }
 
     /// The oldest event not yet taken.
@@ -52,6 +59,12 @@ impl Connection {
     pub fn want(&self, targets: Vec<String>) {
         // The thread ends only with the window.
         drop(self.wants.send(targets));
+    }
+
+    /// Asks the daemon to change the project; the answer is heard as [`ClientEvent::Answer`].
+    pub fn request(&self, ask: Ask) {
+        // The thread ends only with the window.
+        drop(self.requests.send(ask));
     }
 
     /// Where finished frames are reported.
@@ -74,6 +87,7 @@ impl Drop for Connection {
 struct Told {
     reported: Receiver<FrameReport>,
     wanted: Receiver<Vec<String>>,
+    asked: Receiver<Ask>,
 }
 
 /// Passes events on and reports back until the window is gone. The client's receiver cannot be shared between
@@ -98,6 +112,16 @@ fn forward(client: &Client, heard: &Sender<Heard>, told: &Told, wake: impl Fn())
         }
         if let Some(targets) = told.wanted.try_iter().last() {
             client.want(targets);
+        }
+        for ask in told.asked.try_iter() {
+            // Nobody else will answer it.
+            if let Err(reason) = client.request(ask) {
+                let event = ClientEvent::Answer(Answer::refused(0, *reason));
+                if heard.send(Heard { event, unix_ms: unix_ms() }).is_err() {
+                    return;
+                }
+                wake();
+            }
         }
         loop {
             match told.reported.try_recv() {

@@ -87,6 +87,11 @@ impl HeadlessViewer {
         self.renderer.resize(size);
     }
 
+    /// The picture's width and height in pixels.
+    pub fn size(&self) -> [u32; 2] {
+        self.renderer.size()
+    }
+
     /// Draws a frame and waits until the device is done with it.
     ///
     /// # Errors

@@ -186,6 +186,20 @@ impl ParameterValues {
         self.by_name.remove(&key(parameter));
     }
 
+    /// Forgets what the sources say by now, as after it was written there: to as many digits as the parameter's type has.
+    pub fn settle(&mut self, offered: &[OfferedParameter]) {
+        for parameter in offered {
+            let narrow = |values: &[f64]| values.iter().map(|value| *value as f32).collect::<Vec<f32>>();
+            let is_said = self.setting(parameter).is_some_and(|setting| match parameter.is_integer() {
+                true => setting.value == parameter.first,
+                false => narrow(&setting.value) == narrow(&parameter.first),
+            });
+            if is_said {
+                self.reset(parameter);
+            }
+        }
+    }
+
     /// Whether a parameter has another value than its first.
     pub fn is_set(&self, parameter: &OfferedParameter) -> bool {
         self.setting(parameter).is_some()

@@ -118,6 +118,7 @@ fn wait_for_revision(client: &Client, options: &HeadlessOptions) -> anyhow::Resu
             Ok(ClientEvent::Progress { current, .. }) => {
                 last_reason = format!("the daemon is busy: {current}");
             }
+            Ok(ClientEvent::Answer(_)) => {}
             Err(_) => {
                 let (revision, seconds) = (options.revision_min, options.timeout.as_secs_f64());
                 bail!("no revision from {revision} on came within {seconds} s: {last_reason}");

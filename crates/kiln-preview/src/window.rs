@@ -148,11 +148,13 @@ impl Window {
                     self.panels.progress = Some(Progress { done, total, current });
                 }
                 ClientEvent::Revision(revision) => self.receive(revision, unix_ms),
+                ClientEvent::Answer(answer) => panel::requests::receive(&mut self.panels, answer),
             }
         }
         if let Some(ready) = self.worker.take() {
             let is_new = ready.prepared.report.revision != self.panels.report.revision;
             self.panels.adopt(ready.prepared.report.clone());
+            self.panels.view.parameters.settle(&self.panels.report.parameters);
             self.picture.replace(ready, is_new);
         }
         for Finished { report, latency_ms } in self.picture.finished() {
@@ -234,6 +236,7 @@ impl eframe::App for Window {
         panel::show(ui, panels, |ui, state| picture.show(ui, state));
         self.let_go();
         self.remember(ui.ctx(), false);
+        self.panels.requests.take().into_iter().for_each(|ask| self.connection.request(ask));
         if self.wanted() != self.requested {
             self.request();
         }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-use kiln_build::{ActionId, Engine, Error, RunOptions, RunReport, TargetState, Targets};
+use kiln_build::{ActionId, Engine, Error, Progress, RunOptions, RunReport, TargetState, Targets};
 use kiln_diagnostic::{Diagnostic, Severity};
 
 use crate::Project;
@@ -51,19 +51,77 @@ pub fn build_with(
     wishes: Wishes,
     options: &RunOptions,
 ) -> Result<Option<Built>, Error> {
+    build_in_order(engine, changed, wishes, options, |plan, _| run_plan(engine, plan, options))
+}
+
+/// What happened in a run, and for how many milliseconds; `None` if it was cancelled.
+type Ran = Option<(RunReport, f64)>;
+
+fn build_in_order(
+    engine: &Engine,
+    changed: Option<&[String]>,
+    wishes: Wishes,
+    options: &RunOptions,
+    run: impl Fn(&mut Plan, f64) -> Result<Ran, Error>,
+) -> Result<Option<Built>, Error> {
     let mut changed = changed;
     heal(options, |is_first| {
         if !is_first {
             changed = None;
         }
         let start = Instant::now();
-        let plan = plan_with(engine, changed, wishes)?;
+        let mut plan = plan_with(engine, changed, wishes)?;
         let plan_ms = start.elapsed().as_secs_f64() * 1e3;
-        let Some((report, run_ms)) = run_plan(engine, &plan, options)? else { return Ok(None) };
+        let Some((report, run_ms)) = run(&mut plan, plan_ms)? else { return Ok(None) };
         let (targets, diagnostics) = plan.resolve(engine, &report);
         let targets = Arc::new(targets);
         engine.publish(&targets)?;
         Ok(Some(Built { plan, report, targets, diagnostics, plan_ms, run_ms }))
+    })
+}
+
+/// What a build has when all that is wanted most is up to date, and the rest is not.
+pub struct Early {
+    /// Every target: the wanted ones as they are now, those that wait for their actions as they were published last.
+    pub targets: Targets,
+    /// Names of those that wait, also of new ones that have no content yet.
+    pub building: Vec<String>,
+    /// What was said so far.
+    pub diagnostics: Vec<Diagnostic>,
+    /// What happened so far.
+    pub report: RunReport,
+    /// From the call to the plan, milliseconds.
+    pub plan_ms: f64,
+    /// From the plan until now, milliseconds.
+    pub run_ms: f64,
+}
+
+/// Does what [`build_with`] does; shaders, tables and the targets that `is_wanted` names go first, and `early` is told when they are done
+/// and others are not. Nothing of that is published in the store yet.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_wanted_first(
+    engine: &Engine,
+    changed: Option<&[String]>,
+    wishes: Wishes,
+    is_wanted: &dyn Fn(&str) -> bool,
+    early: &(dyn Fn(Early) + Sync),
+    options: &RunOptions,
+) -> Result<Option<Built>, Error> {
+    build_in_order(engine, changed, wishes, options, |plan, plan_ms| {
+        plan.hurry(is_wanted);
+        let start = Instant::now();
+        let plan: &Plan = plan;
+        let tell = |progress: Progress| match progress {
+            Progress::UrgentSettled { report } => {
+                let run_ms = start.elapsed().as_secs_f64() * 1e3;
+                let (targets, building, diagnostics) = plan.resolve_early(engine, report);
+                early(Early { targets, building, diagnostics, report: report.clone(), plan_ms, run_ms });
+            }
+            other => (options.progress)(other),
+        };
+        run_plan(engine, plan, &RunOptions { progress: &tell, ..*options })
     })
 }
 
@@ -107,8 +165,7 @@ fn heal(
 /// More damaged blobs than this in one build are a broken disk.
 pub const HEALING_TRIES_MAX: usize = 64;
 
-/// What happened, and for how many milliseconds; `None` if it was cancelled.
-fn run_plan(engine: &Engine, plan: &Plan, options: &RunOptions) -> Result<Option<(RunReport, f64)>, Error> {
+fn run_plan(engine: &Engine, plan: &Plan, options: &RunOptions) -> Result<Ran, Error> {
     let start = Instant::now();
     let report = engine.run(&plan.graph, options)?;
     let run_ms = start.elapsed().as_secs_f64() * 1e3;

@@ -9,7 +9,8 @@
 //!
 //! Not here: how maps are computed (`kiln-bake`), caching (`kiln-build`), watching (`kiln-daemon`).
 
-pub use build::{Built, HEALING_TRIES_MAX, build, build_apart, build_with};
+pub use add::{Added, add_files};
+pub use build::{Built, Early, HEALING_TRIES_MAX, build, build_apart, build_wanted_first, build_with};
 pub use export::{CONVENTIONS_FILE, ExportFailure, Exported, export, wished};
 // The limits of an environment are those of its recipe.
 pub use check::{Difference, DifferenceKind, differences};
@@ -32,7 +33,11 @@ pub use reader::{parse_bytes, suggest};
 pub use skipped::{Skipped, made, skipped};
 pub use verify::{Mismatch, Verified, VerifyError, verify};
 pub use why::{ActionWhy, CutOff, last_build, why, with_values};
+pub use write_back::{
+    ParameterValue, WrittenSource, describe_written, parse_parameter_value, write_parameters,
+};
 
+mod add;
 mod blob;
 mod build;
 mod check;
@@ -46,6 +51,7 @@ mod lut_config;
 mod output;
 mod plan;
 mod reader;
+mod replace;
 mod scene;
 mod shader;
 mod skipped;
@@ -53,6 +59,7 @@ mod skipped;
 mod tests;
 mod verify;
 mod why;
+mod write_back;
 
 /// Name of the project file.
 pub const PROJECT_FILE: &str = "kiln.toml";

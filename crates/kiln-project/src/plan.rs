@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use kiln_bake::RoughnessLaw;
 use kiln_build::{
-    ActionId, ActionRecord, Engine, Error, Graph, OutputRecord, Part, RunReport, SourceState, Target,
+    ActionId, ActionRecord, Engine, Error, Graph, OutputRecord, Part, RunReport, SourceState, Status, Target,
     TargetState, Targets,
 };
 use kiln_diagnostic::{Diagnostic, has_errors};
@@ -316,6 +316,39 @@ impl Plan {
             }
         }
         diagnostics
+    }
+
+    /// Lets what is wanted go first, with the shaders and tables that any picture needs; unless nothing is wanted.
+    pub(crate) fn hurry(&mut self, is_wanted: &dyn Fn(&str) -> bool) {
+        if !self.targets.iter().any(|target| is_wanted(&target.name)) {
+            return;
+        }
+        let goes_first =
+            |target: &&TargetSpec| ["shader", "lut"].contains(&target.kind) || is_wanted(&target.name);
+        let first = self.targets.iter().filter(goes_first).flat_map(|target| &target.parts);
+        let first: Vec<ActionId> = first.map(PartSpec::action).collect();
+        self.graph.hurry(&first);
+    }
+
+    /// Joins what the actions made so far into targets; those that wait for others stay as they were published, and are named.
+    pub(crate) fn resolve_early(
+        &self,
+        engine: &Engine,
+        report: &RunReport,
+    ) -> (Targets, Vec<String>, Vec<Diagnostic>) {
+        let mut targets = (*engine.published()).clone();
+        let mut building = Vec::new();
+        for spec in &self.targets {
+            let waits = |part: &PartSpec| report.outcome(part.action()).status == Status::NotRun;
+            if spec.parts.iter().any(waits) {
+                building.push(spec.name.clone());
+            } else if let Some(target) = resolve_target(spec, report) {
+                targets.insert(spec.name.clone(), target);
+            } else if let Some(target) = engine.last_good(&spec.name) {
+                targets.insert(spec.name.clone(), target.into_stale());
+            }
+        }
+        (targets, building, self.said(report))
     }
 
     /// Joins what the actions made into targets. One whose actions failed keeps the content that was published last,

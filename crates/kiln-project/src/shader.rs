@@ -15,7 +15,7 @@ use crate::plan::{PartSpec, Planner, Wishes, no_content, rank, unreadable};
 use crate::{OwnTexture, PROJECT_FILE, Role, ShaderConfig};
 
 /// Version of the compiler behind both the scan and the action.
-const COMPILE_RECIPE: u32 = 4;
+const COMPILE_RECIPE: u32 = 5;
 
 /// Feature sets that scenes ask of material shaders.
 #[derive(Default)]

@@ -20,6 +20,7 @@ pub use emit::*;
 pub use link::Read;
 pub use reflect::*;
 pub use source_map::{FunctionSource, SourceMap};
+pub use write_back::{SourceEdit, write_parameter};
 
 mod canonical;
 mod compiler;
@@ -49,6 +50,7 @@ mod tests;
 mod token;
 mod wgsl;
 mod writable;
+mod write_back;
 
 /// A file that was looked at. Missing ones count too, because their appearance changes the result.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]

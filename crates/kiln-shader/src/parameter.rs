@@ -17,19 +17,36 @@
 use std::ops::Range;
 
 use kiln_diagnostic::Diagnostic;
-use serde::{Deserialize, Serialize};
 
 use crate::reflect::{BindingKind, Parameter, ParameterPlace, Reflection, Widget};
 use crate::token::{self, Kind, Token};
 
 /// An annotation and the name it stands at.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Annotation {
-    name: String,
-    widget: Widget,
-    default: Vec<f64>,
+    pub(crate) name: String,
+    pub(crate) widget: Widget,
+    pub(crate) default: Vec<f64>,
     label: String,
+    /// Where its first value stands.
+    pub(crate) place: FirstPlace,
 }
+
+/// Where the first value of a parameter stands: bytes of a file.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct FirstPlace {
+    /// The file.
+    pub(crate) path: String,
+    /// The annotation's own numbers or words for it.
+    pub(crate) arguments: Vec<Range<usize>>,
+    /// Literals of the declaration's initial value, where that is nothing else.
+    pub(crate) literals: Vec<Range<usize>>,
+    /// Where an annotation without such numbers takes them: before its closing bracket.
+    pub(crate) end: Option<usize>,
+}
+
+/// A vector has no more.
+const COMPONENTS_MAX: usize = 4;
 
 const KINDS: [&str; 4] = ["slider", "color", "toggle", "choice"];
 
@@ -52,7 +69,8 @@ pub(crate) fn annotations(
             let is_behind = !code.trim().is_empty();
             let (begin, declared) = if is_behind { (start, code) } else { next_code(text, end) };
             match annotation(kind, rest, declared) {
-                Ok((annotation, name)) if is_kept(begin + name.start..begin + name.end) => {
+                Ok((mut annotation, name)) if is_kept(begin + name.start..begin + name.end) => {
+                    annotation.place.place_in(path, end - rest.len(), begin);
                     found.push(annotation);
                 }
                 Ok(_) => {}
@@ -89,12 +107,36 @@ fn next_code(text: &str, at: usize) -> (usize, &str) {
     (begin, text[begin..].lines().next().unwrap_or_default())
 }
 
-/// What the annotation says of `code`, and where in it the name stands.
+impl FirstPlace {
+    /// What was found in the rest of a comment and in a declaration, as bytes of the file that both stand in.
+    fn place_in(&mut self, path: &str, rest: usize, declaration: usize) {
+        self.path = path.to_owned();
+        self.end = self.end.map(|end| end + rest);
+        let shift = |range: &mut Range<usize>, by: usize| *range = range.start + by..range.end + by;
+        self.arguments.iter_mut().for_each(|range| shift(range, rest));
+        self.literals.iter_mut().for_each(|range| shift(range, declaration));
+    }
+}
+
+/// Bytes of what stands between commas, without space around it.
+fn arguments(inside: &str, start: usize) -> Vec<Range<usize>> {
+    let mut at = start;
+    let mut places = Vec::new();
+    for part in inside.split(',') {
+        let from = at + part.len() - part.trim_start().len();
+        places.push(from..from + part.trim().len());
+        at += part.len() + 1;
+    }
+    places
+}
+
+/// What the annotation says of `code`, and where in it the name stands. Its places are bytes of `rest` and of `code`.
 fn annotation(kind: &str, rest: &str, code: &str) -> Result<(Annotation, Range<usize>), String> {
     let values = rest.strip_prefix('(').ok_or("this annotation has no values in brackets")?;
     let (inside, label) = values.split_once(')').ok_or("this annotation is never closed")?;
-    let arguments: Vec<&str> = inside.split(',').map(str::trim).collect();
-    let (range, value) = declaration(code)?;
+    let mut places = arguments(inside, 1);
+    let arguments: Vec<&str> = places.iter().map(|place| &rest[place.clone()]).collect();
+    let Declared { name: range, literals, value } = declaration(code)?;
     let name = code[range.clone()].to_owned();
     let label = label.trim().to_owned();
     let number = |text: &str| -> Result<f64, String> {
@@ -104,7 +146,7 @@ fn annotation(kind: &str, rest: &str, code: &str) -> Result<(Annotation, Range<u
     let numbers = || arguments.iter().map(|argument| number(argument)).collect::<Result<Vec<f64>, String>>();
     let (widget, default) = match kind {
         "slider" => match numbers()?[..] {
-            [least, greatest, ref default @ ..] if least < greatest && default.len() <= 1 => {
+            [least, greatest, ref default @ ..] if least < greatest && default.len() <= COMPONENTS_MAX => {
                 if default.iter().any(|default| !(least..=greatest).contains(default)) {
                     return Err("the default lies outside the slider".to_owned());
                 }
@@ -130,22 +172,35 @@ fn annotation(kind: &str, rest: &str, code: &str) -> Result<(Annotation, Range<u
             (Widget::Choice { names }, vec![default])
         }
     };
+    let first = if matches!(widget, Widget::Slider { .. }) { 2 } else { 0 };
+    let count = if matches!(widget, Widget::Choice { .. }) { 1 } else { default.len() };
+    let arguments: Vec<Range<usize>> = places.drain(first..first + count).collect();
+    let place = FirstPlace { arguments, literals, end: Some(1 + inside.len()), ..FirstPlace::default() };
     let default = if default.is_empty() { value.into_iter().collect() } else { default };
-    Ok((Annotation { name, widget, default, label }, range))
+    Ok((Annotation { name, widget, default, label, place }, range))
 }
 
-/// What a line declares: the word before its `:` in WGSL, before its `;`, `=` or `[` in GLSL; and the number behind its `=`.
-fn declaration(code: &str) -> Result<(Range<usize>, Option<f64>), String> {
+/// What a line declares, in bytes of it.
+struct Declared {
+    name: Range<usize>,
+    /// See [`FirstPlace::literals`].
+    literals: Vec<Range<usize>>,
+    /// The number behind `=`.
+    value: Option<f64>,
+}
+
+/// What a line declares: the word before its `:` in WGSL, before its `;`, `=` or `[` in GLSL; and what is behind its `=`.
+fn declaration(code: &str) -> Result<Declared, String> {
     let nowhere = || "this annotation stands at no declaration".to_owned();
     let all = token::tokenize(code).map_err(|_| nowhere())?;
     // What stands in brackets, as in `layout(location = 0)`, declares nothing.
     let mut depth = 0_usize;
     let mut tokens: Vec<Token> = Vec::new();
-    for token in all {
+    for token in &all {
         match token.kind {
             Kind::Mark(')') => depth = depth.saturating_sub(1),
             Kind::Mark('(') => depth += 1,
-            _ if depth == 0 => tokens.push(token),
+            _ if depth == 0 => tokens.push(*token),
             _ => {}
         }
     }
@@ -158,24 +213,53 @@ fn declaration(code: &str) -> Result<(Range<usize>, Option<f64>), String> {
     }
     let end = first.or_else(|| tokens.iter().position(|token| is(token, &[';', '=', '['])));
     let name = end.and_then(|at| tokens.get(at.checked_sub(1)?)).filter(|token| token.kind == Kind::Word);
-    let value = tokens.iter().position(|token| token.is('=')).and_then(|at| tokens.get(at + 1));
-    let value = value.and_then(|token| code[token.range()].trim_end_matches(['f', 'u', 'i']).parse().ok());
-    Ok((name.ok_or_else(nowhere)?.range(), value))
+    let name = name.ok_or_else(nowhere)?.range();
+    let equals = tokens.iter().find(|token| token.is('='));
+    let initial = equals.and_then(|equals| all.iter().position(|token| token.start > equals.start));
+    let literals = initial.map_or(Vec::new(), |at| initial_literals(code, &all[at..]));
+    let value = match &literals[..] {
+        [one] => code[one.clone()].trim_end_matches(['f', 'u', 'i']).parse().ok(),
+        _ => None,
+    };
+    Ok(Declared { name, literals, value })
 }
 
-/// Gives the parameter `name` its first value, unless its annotation says one; without an annotation it becomes one.
-pub(crate) fn give_first(annotations: &mut Vec<Annotation>, name: &str, is_flag: bool, value: Vec<f64>) {
+/// The literals of an initial value that ends at a `;`: one, or those of a constructor as `vec2(1.0, 0.5)`. None where it is
+/// worked out.
+fn initial_literals(code: &str, tokens: &[Token]) -> Vec<Range<usize>> {
+    let end = tokens.iter().position(|token| token.is(';')).unwrap_or(tokens.len());
+    let (tokens, mut found) = (&tokens[..end], Vec::new());
+    let parts = match tokens {
+        [ty, open, inside @ .., close] if ty.kind == Kind::Word && open.is('(') && close.is(')') => inside,
+        _ => tokens,
+    };
+    for part in parts.split(|token| token.is(',')) {
+        let is_word = |token: &Token| ["true", "false"].iter().any(|word| token.is_word(code, word));
+        match part {
+            [one] if one.kind == Kind::Number || is_word(one) => found.push(one.range()),
+            [minus, one] if minus.is('-') && one.kind == Kind::Number => found.push(minus.start..one.end),
+            _ => return Vec::new(),
+        }
+    }
+    found
+}
+
+/// Gives the parameter `name` its first value, unless its annotation says one; without an annotation it becomes one. `place` is
+/// where that value stands.
+pub(crate) fn give_first(
+    annotations: &mut Vec<Annotation>,
+    name: &str,
+    is_flag: bool,
+    value: Vec<f64>,
+    place: FirstPlace,
+) {
     match annotations.iter_mut().find(|annotation| annotation.name == name) {
         Some(annotation) if annotation.default.is_empty() => annotation.default = value,
         Some(_) => {}
         None => {
             let widget = if is_flag { Widget::Toggle } else { Widget::Number };
-            annotations.push(Annotation {
-                name: name.to_owned(),
-                widget,
-                default: value,
-                label: String::new(),
-            });
+            let label = String::new();
+            annotations.push(Annotation { name: name.to_owned(), widget, default: value, label, place });
         }
     }
 }
@@ -196,7 +280,7 @@ pub(crate) fn parameters(reflection: &Reflection, annotations: Vec<Annotation>) 
             let binding = reflection.bindings.iter().find(|binding| has_member(&binding.kind))?;
             Some(ParameterPlace::Member { uniform: binding.name.clone() })
         });
-        let Annotation { name, widget, mut default, label } = annotation;
+        let Annotation { name, widget, mut default, label, .. } = annotation;
         if default.is_empty() {
             // A slider without a default starts where the override does, else at its least.
             let least = if let Widget::Slider { least, .. } = widget { least } else { 0.0 };

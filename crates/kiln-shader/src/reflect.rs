@@ -17,6 +17,22 @@ pub struct Reflection {
     pub parameters: Vec<Parameter>,
 }
 
+impl Reflection {
+    /// WGSL type of one of its parameters.
+    pub fn parameter_type(&self, parameter: &Parameter) -> Option<&str> {
+        let ParameterPlace::Member { uniform } = &parameter.place else {
+            let constant = self.overrides.iter().find(|constant| constant.name == parameter.name)?;
+            return Some(&constant.ty);
+        };
+        let BindingKind::Uniform { members, .. } =
+            &self.bindings.iter().find(|binding| binding.name == *uniform)?.kind
+        else {
+            return None;
+        };
+        members.iter().find(|member| member.name == parameter.name).map(|member| member.ty.as_str())
+    }
+}
+
 /// A constant that a pipeline may set.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Override {

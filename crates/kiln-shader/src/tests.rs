@@ -24,6 +24,7 @@ mod random;
 mod ranges;
 mod shaders;
 mod source_maps;
+mod write_back;
 
 /// A project in memory.
 struct Files(BTreeMap<String, Arc<str>>);

@@ -50,6 +50,16 @@ pub fn compile(
     outcome
 }
 
+/// The annotations of a module, and of those it imports, that need not be valid.
+pub fn program_annotations(
+    root: &str,
+    features: &BTreeSet<String>,
+    read: &mut Read<'_>,
+) -> Vec<parameter::Annotation> {
+    let graph = Graph::load(root, Mode::Features(features), &mut Library::default(), read);
+    annotations(&graph, &mut Vec::new())
+}
+
 fn annotations(graph: &Graph, diagnostics: &mut Vec<Diagnostic>) -> Vec<parameter::Annotation> {
     let of_module = |module: &crate::link::Module| {
         let cuts = &module.view.cuts;

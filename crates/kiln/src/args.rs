@@ -7,9 +7,11 @@ use clap::{Args as ClapArgs, Parser, Subcommand};
 mod inspect;
 mod render;
 mod shader;
+mod sources;
 
 pub(crate) use render::*;
 pub(crate) use shader::*;
+pub(crate) use sources::*;
 
 /// Look-dev without the wait: bakes image-based lighting without noise, checks shaders, and shows every edit
 /// in a live preview.
@@ -53,6 +55,10 @@ pub(crate) enum Command {
     Gc(GcArgs),
     /// Examine the cache, this machine's graphics adapters, and the limits
     Doctor(DoctorArgs),
+    /// Add environments and scenes to a project: copies files, with what they refer to, and names them in kiln.toml
+    Add(AddArgs),
+    /// Write values of parameters into the shaders that declare them, and leave all else as it is
+    Set(SetArgs),
     /// Bake, then follow every edit and publish it to connected previews
     Watch(WatchArgs),
     /// Say whether a project is watched, what is published and building, and what its clients show; exit code 1 if it is not

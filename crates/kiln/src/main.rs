@@ -56,6 +56,8 @@ fn main() -> ExitCode {
         args::Command::Verify(args) => commands::verify::run(&args),
         args::Command::Gc(args) => commands::gc::run(&args),
         args::Command::Doctor(args) => commands::doctor::run(&args),
+        args::Command::Add(args) => commands::add::run(&args),
+        args::Command::Set(args) => commands::set::run(&args),
         args::Command::Watch(args) => commands::watch::run(&args),
         args::Command::Status(args) => commands::status::run(&args),
         args::Command::Stop(args) => commands::stop::run(&args),

@@ -72,9 +72,13 @@ pub(crate) fn group_label(name: &str) -> String {
 pub(crate) fn revision_line(table: &RevisionTable) -> String {
     let stale = table.targets.values().filter(|target| target.state == TargetState::Stale).count();
     let stale = if stale == 0 { String::new() } else { format!(", {} stale", count(stale, "target")) };
+    let coming = match table.building.len() {
+        0 => String::new(),
+        coming => format!(", {} to come", count(coming, "target")),
+    };
     let Work { ran, reused, plan_ms, run_ms, .. } = &table.work;
     format!(
-        "revision {}: {} ran, {reused} reused{stale}; planned in {}, ran in {}",
+        "revision {}: {} ran, {reused} reused{stale}{coming}; planned in {}, ran in {}",
         table.number,
         count(ran.len(), "action"),
         duration(*plan_ms),

@@ -173,7 +173,7 @@ impl Bench {
 }
 
 /// An .hdr with another last texel: its mantissa and the comment line change with `index`.
-fn with_comment(hdr: &[u8], index: usize) -> Vec<u8> {
+pub(crate) fn with_comment(hdr: &[u8], index: usize) -> Vec<u8> {
     let mut bytes = hdr.to_vec();
     // The file ends with the exponent run of the last row, encoded as runs: `index` goes into the EXPOSURE line,
     // which scales all texels and so changes every map.

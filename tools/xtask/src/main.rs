@@ -15,6 +15,7 @@ mod bench;
 mod bench_bake;
 mod bench_cache;
 mod bench_demand;
+mod bench_loop;
 mod bench_render;
 mod bench_scenes;
 mod bench_shaders;
@@ -38,6 +39,7 @@ cargo xtask bench bake […]        error and cost of prefiltered maps beside a 
                                   one part alone; --huge: memory of a 16384×8192 panorama; panoramas from $KILN_CORPUS
 cargo xtask faults [COUNT]        kill COUNT processes at random moments and flip COUNT bits (default 1000)
 cargo xtask fuzz [COUNT] [SEED]   decode COUNT damaged copies of each image file of the tests (default 100000)
+cargo xtask bench loop [EDITS]    every stage from a save to its picture, p50, p95 and p99 (default 200)
 cargo xtask fuzz shaders [COUNT] [SEED]
                                   compile COUNT damaged, COUNT random WGSL and COUNT random GLSL shaders in the worker (default 10000)
 cargo xtask fuzz wire [COUNT] [SEED]
@@ -56,6 +58,11 @@ fn main() -> ExitCode {
         ["bench", "cache"] => bench_cache::run(),
         ["bench", "swap"] => test::swaps("1000"),
         ["bench", "swap", count] => test::swaps(count),
+        ["bench", "loop"] => bench_loop::run(200),
+        ["bench", "loop", edits] => match edits.parse() {
+            Ok(edits) => bench_loop::run(edits),
+            Err(_) => Err(format!("`{edits}` is no number of edits")),
+        },
         ["bench", "demand"] => bench_demand::run(),
         ["bench", "render"] => bench_render::run(8),
         ["bench", "render", frames] => match frames.parse() {

@@ -58,6 +58,66 @@ fn action_larger_than_the_memory_runs_alone() {
     assert_eq!(most.load(Ordering::SeqCst), 1);
 }
 
+/// Chains of two, `count` of them: `make N`, `use N`.
+fn chains(count: usize) -> Graph {
+    let mut graph = Graph::default();
+    for index in 0..count {
+        let made_by = |name: &str, inputs| {
+            let text = format!("{name} {index}");
+            let step =
+                action(name, json!({"index": index}), inputs, &["x"], move |_| Ok(made("x", text.clone())));
+            Action { name: format!("{name} {index}"), ..step }
+        };
+        let make = graph.add(made_by("make", vec![]));
+        graph.add(made_by("use", vec![Input::Output { action: make, output: "x".into() }]));
+    }
+    graph
+}
+
+/// What a run of chains of which the third is urgent did: names in their order, and what was settled when it said so.
+fn hurried(place: &Place, mut graph: Graph) -> (Vec<String>, Vec<usize>) {
+    let third = graph.iter().find(|(_, action)| action.name == "use 2").expect("there are three").0;
+    graph.hurry(&[third]);
+    let early = std::sync::Mutex::new(Vec::new());
+    let note = |progress: Progress| {
+        if let Progress::UrgentSettled { report } = progress {
+            assert!(report.outcome(third).succeeded());
+            early.lock().unwrap().push(report.outcomes.iter().filter(|outcome| outcome.succeeded()).count());
+        }
+    };
+    let cancel = AtomicBool::new(false);
+    let report = place.engine().run(&graph, &options(1, &cancel, &note)).unwrap();
+    let names = report.ended.iter().map(|id| graph.action(*id).name.clone()).collect();
+    (names, early.into_inner().unwrap())
+}
+
+#[test]
+fn urgent_actions_and_what_they_read_go_first_and_it_is_said_when_they_are_done() {
+    let place = Place::new();
+    let (order, early) = hurried(&place, chains(3));
+    assert_eq!(order, ["make 2", "use 2", "make 0", "use 0", "make 1", "use 1"]);
+    assert_eq!(early, [2]);
+    let (order, early) = hurried(&place, chains(3));
+    assert!(order.is_empty() && early.is_empty(), "nothing was waited for");
+}
+
+#[test]
+fn run_that_has_nothing_left_or_did_nothing_urgent_says_nothing_early() {
+    let place = Place::new();
+    let graph = chains(3);
+    let urgent = graph.iter().filter(|(_, action)| action.name.ends_with('2')).map(|(id, _)| id);
+    let (alone, _) = graph.only(&urgent.collect::<Vec<_>>());
+    run(&place.engine(), &alone, 1);
+    let (order, early) = hurried(&place, chains(3));
+    assert_eq!((order.len(), early), (4, vec![]), "the urgent ones were up to date");
+    let place = Place::new();
+    let others = graph.iter().filter(|(_, action)| !action.name.ends_with('2')).map(|(id, _)| id);
+    let (others, _) = graph.only(&others.collect::<Vec<_>>());
+    run(&place.engine(), &others, 1);
+    let (order, early) = hurried(&place, chains(3));
+    assert_eq!((order.len(), early), (2, vec![]), "the end of the run says it");
+}
+
 /// One that fails, one that could run, and one that is in the store when `warm`.
 fn fails_first() -> Graph {
     let mut graph = Graph::default();

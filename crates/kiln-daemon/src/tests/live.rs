@@ -14,22 +14,24 @@ use super::LIMIT;
 use crate::{Daemon, DaemonOptions, Notice};
 
 /// A panorama of 16×8 texels of this mantissa.
-fn hdr(mantissa: u8) -> Vec<u8> {
+pub(super) fn hdr(mantissa: u8) -> Vec<u8> {
     let mut bytes = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8 +X 16\n".to_vec();
     bytes.extend([mantissa, mantissa, mantissa, 128].repeat(16 * 8));
     bytes
 }
 
-struct Running {
+pub(super) struct Running {
     folder: tempfile::TempDir,
     notices: Receiver<Notice>,
-    socket: PathBuf,
+    pub(super) socket: PathBuf,
     thread: Option<JoinHandle<()>>,
+    /// The first revision.
+    first: Option<Arc<RevisionTable>>,
 }
 
 impl Running {
     /// A daemon that has published its first revision.
-    fn start(poll: Option<Duration>, source: impl Fn(&Path)) -> Running {
+    pub(super) fn start(poll: Option<Duration>, source: impl Fn(&Path)) -> Running {
         let folder = tempfile::tempdir().unwrap();
         let project = folder.path().join("project");
         fs::create_dir(&project).unwrap();
@@ -39,7 +41,8 @@ impl Running {
         let options = DaemonOptions {
             folder: project,
             cache: folder.path().join("cache"),
-            jobs: 2,
+            // One, so that the order of actions is that of their urgency.
+            jobs: 1,
             memory_bytes: 1 << 30,
             cache_bytes_max: 1 << 30,
             write_outputs: false,
@@ -49,13 +52,14 @@ impl Running {
         let socket = daemon.socket().to_owned();
         let (sender, notices) = channel();
         let thread = std::thread::spawn(move || daemon.run(&mut |notice| drop(sender.send(notice))));
-        let running = Running { folder, notices, socket, thread: Some(thread) };
+        let mut running = Running { folder, notices, socket, thread: Some(thread), first: None };
         let first = running.published();
         assert!(!has_error(&first), "{:?}", first.diagnostics);
+        running.first = Some(first);
         running
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    pub(super) fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
@@ -63,7 +67,15 @@ impl Running {
         self.notices.recv_timeout(LIMIT).expect("a notice in time")
     }
 
-    fn published(&self) -> Arc<RevisionTable> {
+    /// Asks until the daemon is as wanted.
+    fn wait_until(&self, is_wanted: impl Fn(&kiln_link::DaemonStatus) -> bool) {
+        let deadline = std::time::Instant::now() + LIMIT;
+        while !is_wanted(&kiln_link::status(&self.socket, LIMIT).unwrap()) {
+            assert!(std::time::Instant::now() < deadline);
+        }
+    }
+
+    pub(super) fn published(&self) -> Arc<RevisionTable> {
         loop {
             if let Notice::Published(table) = self.notice() {
                 return table;
@@ -237,4 +249,50 @@ fn shaders_that_show_channels_come_when_a_client_wants_them_and_go_with_it() {
     assert!(!inspected(&table), "nobody wants them");
     assert_eq!(table.number, 3);
     drop(first);
+}
+
+/// Two environments of one file, so that one edit is about both.
+fn two(folder: &Path) {
+    let project = folder.join("project");
+    let toml = fs::read_to_string(project.join("kiln.toml")).unwrap();
+    let other = "[env.dusk]\nsource = \"sky.hdr\"\nsize = 32\nbake = \"all\"\n";
+    fs::write(project.join("kiln.toml"), toml + other).unwrap();
+    fs::write(project.join("sky.hdr"), hdr(100)).unwrap();
+}
+
+/// Edits both environments and returns what is published then, up to the whole.
+fn edit_both(daemon: &Running) -> Vec<Arc<RevisionTable>> {
+    let new = daemon.path("new.hdr");
+    fs::write(&new, hdr(200)).unwrap();
+    fs::rename(new, daemon.path("project/sky.hdr")).unwrap();
+    let mut tables = vec![daemon.published()];
+    while !tables.last().is_some_and(|table| table.building.is_empty()) {
+        tables.push(daemon.published());
+    }
+    tables
+}
+
+#[test]
+fn what_a_client_shows_is_published_before_the_rest_is_made() {
+    let daemon = Running::start(None, two);
+    let before = daemon.first.clone().unwrap();
+    let client = kiln_link::Client::connect(daemon.socket.clone(), "shows dusk");
+    client.want(vec!["env/dusk".to_owned()]);
+    daemon.wait_until(|status| status.clients.iter().any(|client| !client.wants.is_empty()));
+    let tables = edit_both(&daemon);
+    let of = |table: &RevisionTable, name: &str| table.targets[name].parts.clone();
+    let last = tables.last().unwrap();
+    assert!(last.targets.keys().all(|name| last.targets[name].state == TargetState::Fresh));
+    let [early, _] = &tables[..] else { panic!("{} revisions: {:?}", tables.len(), last.work.ran) };
+    assert_eq!(of(early, "env/dusk/specular"), of(last, "env/dusk/specular"));
+    assert_ne!(of(early, "env/dusk/specular"), of(&before, "env/dusk/specular"));
+    assert!(early.building.iter().all(|name| name.starts_with("env/sky/")), "{:?}", early.building);
+    assert_eq!(of(early, "env/sky/specular"), of(&before, "env/sky/specular"));
+    assert_ne!(of(last, "env/sky/specular"), of(&before, "env/sky/specular"));
+}
+
+#[test]
+fn without_a_client_that_shows_something_nothing_is_published_early() {
+    let daemon = Running::start(None, two);
+    assert!(edit_both(&daemon).iter().all(|table| table.building.is_empty()));
 }

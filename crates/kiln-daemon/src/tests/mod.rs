@@ -1,6 +1,7 @@
 //! Watching by itself, and whole daemons on small projects.
 
 mod live;
+mod requests;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

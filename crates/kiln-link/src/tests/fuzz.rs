@@ -7,6 +7,7 @@ use std::os::unix::net::{UnixListener, UnixStream};
 use std::sync::Arc;
 
 use kiln_build::Digest;
+use kiln_diagnostic::Diagnostic;
 
 use super::{Bench, LIMIT, chunk, greeted, next_revision, serve, table};
 use crate::session::ClientSession;
@@ -20,7 +21,7 @@ const OVER_SOCKETS: u64 = 20;
 
 const CONTENTS: [&[u8]; 3] = [b"first", b"second content", b""];
 
-fn number(variable: &str, otherwise: u64) -> u64 {
+pub(super) fn number(variable: &str, otherwise: u64) -> u64 {
     match std::env::var(variable) {
         Ok(text) => text.parse().unwrap_or_else(|_| panic!("{variable}={text} is no number")),
         Err(_) => otherwise,
@@ -32,10 +33,10 @@ fn talk_count() -> u64 {
 }
 
 /// SplitMix64.
-struct Random(u64);
+pub(super) struct Random(u64);
 
 impl Random {
-    fn new(stream: u64) -> Random {
+    pub(super) fn new(stream: u64) -> Random {
         Random(number("KILN_FUZZ_SEED", 20_261_122).wrapping_add(stream << 32))
     }
 
@@ -47,7 +48,7 @@ impl Random {
         mixed ^ (mixed >> 31)
     }
 
-    fn below(&mut self, end: usize) -> usize {
+    pub(super) fn below(&mut self, end: usize) -> usize {
         (self.next() % end.max(1) as u64) as usize
     }
 
@@ -83,6 +84,11 @@ impl Random {
     }
 }
 
+fn write_request(id: u64) -> ClientMessage {
+    let write = ParameterWrite { shader: "pbr".into(), name: "wetness".into(), value: vec![0.25] };
+    ClientMessage::Request(Request { id, ask: Ask::WriteParameters { parameters: vec![write] } })
+}
+
 fn client_talk() -> Vec<u8> {
     let messages = [
         ClientMessage::Hello(Hello::new("fuzz", &[capability::REVISIONS])),
@@ -97,6 +103,8 @@ fn client_talk() -> Vec<u8> {
             drawn_unix_ms: 3.0,
         }),
         ClientMessage::Status,
+        write_request(1),
+        ClientMessage::Request(Request { id: 2, ask: Ask::AddFiles { paths: vec!["/a.hdr".into()] } }),
     ];
     messages.iter().flat_map(Message::encode).collect()
 }
@@ -109,6 +117,7 @@ fn server_messages() -> Vec<ServerMessage> {
         ServerMessage::Progress(ProgressReport::default()),
         ServerMessage::Pong(1),
         ServerMessage::Status(Box::default()),
+        ServerMessage::Answer(Answer::refused(1, Diagnostic::error("no"))),
     ];
     messages.extend(CONTENTS.map(|bytes| chunk(bytes, bytes)));
     messages
@@ -261,7 +270,8 @@ fn wait_for_revision(client: &Client, number: u64) {
             ClientEvent::Revision(_)
             | ClientEvent::Connected { .. }
             | ClientEvent::Disconnected { .. }
-            | ClientEvent::Progress { .. } => {}
+            | ClientEvent::Progress { .. }
+            | ClientEvent::Answer(_) => {}
         }
     }
 }

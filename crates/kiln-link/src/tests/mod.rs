@@ -6,6 +6,8 @@ mod control;
 mod fuzz;
 mod python;
 mod queue;
+mod requests;
+mod simulation;
 
 use std::collections::{BTreeMap, HashMap};
 use std::io::{Read as _, Write as _};
@@ -63,7 +65,7 @@ fn next_revision(client: &Client) -> Arc<Revision> {
         match client.events().recv_timeout(LIMIT).expect("a revision in time") {
             ClientEvent::Revision(revision) => return revision,
             ClientEvent::Disconnected { reason } => panic!("{reason}"),
-            ClientEvent::Connected { .. } | ClientEvent::Progress { .. } => {}
+            ClientEvent::Connected { .. } | ClientEvent::Progress { .. } | ClientEvent::Answer(_) => {}
         }
     }
 }
@@ -102,7 +104,8 @@ fn client_reconnects_to_the_next_daemon_on_the_same_socket() {
             ClientEvent::Revision(revision) => break assert_eq!(revision.table.number, 5),
             ClientEvent::Connected { .. }
             | ClientEvent::Disconnected { .. }
-            | ClientEvent::Progress { .. } => {}
+            | ClientEvent::Progress { .. }
+            | ClientEvent::Answer(_) => {}
         }
     }
 }

@@ -164,3 +164,17 @@ fn few_contents_are_held_in_memory_however_often_a_more_urgent_one_comes() {
     assert_eq!(touched[..4], [0, 1, 2, 3], "each was more urgent than the one before");
     assert!(touched[4..].iter().all(|index| *index == 3), "no fifth was begun: {touched:?}");
 }
+
+#[test]
+fn content_that_a_newer_table_names_again_is_not_said_to_be_missing() {
+    let table = |number, bytes: &[u8]| {
+        let targets = BTreeMap::from([("env/a".to_owned(), target("cube", &[bytes.to_vec()]))]);
+        Arc::new(RevisionTable { number, targets, ..RevisionTable::default() })
+    };
+    let mut queue = SendQueue::default();
+    queue.tell(table(1, b"other"));
+    queue.fetch([Digest::of(b"back")]);
+    assert_eq!(queue.next(), Some(Step::Missing(Digest::of(b"back"))), "this table does without it");
+    queue.tell(table(2, b"back"));
+    assert_eq!(queue.next(), Some(Step::Read(Digest::of(b"back"))));
+}

@@ -81,7 +81,7 @@ fn show_status(ui: &Ui, place: Rect, state: &PanelState) {
     });
 }
 
-fn show_diagnostic(ui: &mut Ui, diagnostic: &Diagnostic) {
+pub(super) fn show_diagnostic(ui: &mut Ui, diagnostic: &Diagnostic) {
     ui.spacing_mut().item_spacing.y = 3.0;
     ui.horizontal_wrapped(|ui| {
         let color = color_of(theme::of(ui), diagnostic.severity);

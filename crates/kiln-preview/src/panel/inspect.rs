@@ -117,7 +117,11 @@ fn show_marks(ui: &mut Ui, state: &mut PanelState) {
         ui.horizontal(|ui| {
             swatch(ui, color);
             let text = RichText::new(format!("{name}: {count} pixels")).small();
-            ui.label(if count > 0 { text.color(theme::of(ui).error) } else { text.color(theme::of(ui).weak) });
+            ui.label(if count > 0 {
+                text.color(theme::of(ui).error)
+            } else {
+                text.color(theme::of(ui).weak)
+            });
         });
     }
 }

@@ -21,7 +21,9 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState) {
                 format!("{} draws", material.draw_count)
             };
             ui.label(
-                RichText::new(format!("variant {}, {draws}", material.variant)).small().color(theme::of(ui).accent),
+                RichText::new(format!("variant {}, {draws}", material.variant))
+                    .small()
+                    .color(theme::of(ui).accent),
             );
             for (effect, why) in &material.effects {
                 ui.horizontal_wrapped(|ui| {

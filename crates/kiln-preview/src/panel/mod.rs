@@ -28,6 +28,7 @@ mod inspect;
 pub(crate) mod keys;
 mod materials;
 mod parameters;
+pub(crate) mod requests;
 pub(crate) mod scene;
 pub(crate) mod shots;
 mod side;
@@ -97,6 +98,8 @@ pub(crate) struct PanelState {
     pub layout: Layout,
     /// What the window has to say of itself.
     pub window_notes: Vec<String>,
+    /// What the daemon is asked to do.
+    pub requests: requests::Requests,
 }
 
 /// What to bring into view.
@@ -136,6 +139,7 @@ impl PanelState {
             named_views: Vec::new(),
             layout: Layout::default(),
             window_notes: Vec::new(),
+            requests: requests::Requests::default(),
         }
     }
 
@@ -149,6 +153,7 @@ impl PanelState {
         self.note_stale(table);
         self.history.receive(table, received_unix_ms);
         self.progress = None;
+        requests::receive_revision(self, table);
     }
 
     /// Takes over what came of a revision that is shown from now on.
@@ -192,6 +197,7 @@ pub(crate) fn show(ui: &mut Ui, state: &mut PanelState, show_picture: impl FnOnc
     theme::choose(ui.ctx(), state.layout.theme);
     keys::dispatch(ui, state);
     scene::play(ui, state);
+    requests::take_dropped(ui, state);
     if !state.are_panels_hidden {
         show_panels(ui, state);
     }
@@ -203,6 +209,7 @@ pub(crate) fn show(ui: &mut Ui, state: &mut PanelState, show_picture: impl FnOnc
         hold::show_over(ui, place, state);
         shots::show_over(ui, place, state);
         help::show_over(ui, state);
+        requests::show_over(ui, place, state);
     });
 }
 

@@ -3,26 +3,44 @@
 use egui::{Checkbox, ComboBox, RichText, Slider, Ui, WidgetInfo};
 use kiln_shader::Widget;
 
+use super::requests::Requests;
 use crate::parameter::{OfferedParameter, ParameterValues};
 
 /// Room for the number behind a slider.
 const NUMBER_WIDTH: f32 = 72.0;
 
-pub(super) fn show(ui: &mut Ui, offered: &[OfferedParameter], values: &mut ParameterValues) {
+pub(super) fn show(
+    ui: &mut Ui,
+    offered: &[OfferedParameter],
+    values: &mut ParameterValues,
+    requests: &mut Requests,
+) {
     for of_shader in offered.chunk_by(|a, b| a.shader == b.shader) {
         let shader = &of_shader[0].shader;
         super::side::section(ui, &format!("Shader {shader}"));
-        of_shader.iter().for_each(|parameter| show_parameter(ui, parameter, values));
-        let is_any_set = of_shader.iter().any(|parameter| values.is_set(parameter));
-        let reset = egui::Button::new(format!("Reset {shader}"));
-        if ui.add_enabled(is_any_set, reset).clicked() {
-            of_shader.iter().for_each(|parameter| values.reset(parameter));
-        }
+        of_shader.iter().for_each(|parameter| show_parameter(ui, parameter, values, requests));
+        let set: Vec<&OfferedParameter> = of_shader.iter().filter(|it| values.is_set(it)).collect();
+        ui.horizontal_wrapped(|ui| {
+            let reset = egui::Button::new(format!("Reset {shader}"));
+            if ui.add_enabled(!set.is_empty(), reset).clicked() {
+                of_shader.iter().for_each(|parameter| values.reset(parameter));
+            }
+            let write = egui::Button::new(format!("Write all of {shader}"));
+            let help = "write every value that you changed into the source that declares it";
+            if ui.add_enabled(!set.is_empty(), write).on_hover_text(help).clicked() {
+                requests.write(set, values);
+            }
+        });
     }
 }
 
 /// Its name with what is short beside it; sliders below, as wide as there is room.
-fn show_parameter(ui: &mut Ui, parameter: &OfferedParameter, values: &mut ParameterValues) {
+fn show_parameter(
+    ui: &mut Ui,
+    parameter: &OfferedParameter,
+    values: &mut ParameterValues,
+    requests: &mut Requests,
+) {
     let before = values.of(parameter);
     let mut value = before.clone();
     let is_slider = matches!(parameter.widget, Widget::Slider { .. });
@@ -31,8 +49,13 @@ fn show_parameter(ui: &mut Ui, parameter: &OfferedParameter, values: &mut Parame
         if !is_slider {
             show_widget(ui, parameter, &mut value, label);
         }
-        if values.is_set(parameter) && is_reset(ui, parameter) {
-            value.clone_from(&parameter.first);
+        if values.is_set(parameter) {
+            if is_pressed(ui, parameter, "reset", "back to its first value") {
+                value.clone_from(&parameter.first);
+            }
+            if is_pressed(ui, parameter, "write", "write this value into the source that declares it") {
+                requests.write([parameter], values);
+            }
         }
         label
     });
@@ -47,11 +70,12 @@ fn show_parameter(ui: &mut Ui, parameter: &OfferedParameter, values: &mut Parame
     }
 }
 
-fn is_reset(ui: &mut Ui, parameter: &OfferedParameter) -> bool {
-    let reset = ui.add(egui::Button::new(RichText::new("reset").small()).frame(false));
+/// A small button behind the name; what it does is said by `verb` and the parameter's name to whoever cannot see where it is.
+fn is_pressed(ui: &mut Ui, parameter: &OfferedParameter, verb: &str, help: &str) -> bool {
+    let button = ui.add(egui::Button::new(RichText::new(verb).small()).frame(false));
     let name = parameter.full_name();
-    reset.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, format!("reset {name}")));
-    reset.on_hover_text("back to its first value").clicked()
+    button.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, format!("{verb} {name}")));
+    button.on_hover_text(help).clicked()
 }
 
 fn show_widget(ui: &mut Ui, parameter: &OfferedParameter, value: &mut [f64], label: egui::Id) {

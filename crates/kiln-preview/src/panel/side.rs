@@ -24,7 +24,8 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState) {
         show_diffuse(ui, &mut state.selection.diffuse);
         section(ui, "Background and ground");
         super::surroundings::show(ui, state);
-        super::parameters::show(ui, &state.report.parameters, &mut state.view.parameters);
+        let values = &mut state.view.parameters;
+        super::parameters::show(ui, &state.report.parameters, values, &mut state.requests);
         section(ui, "Camera");
         super::scene::show_cameras(ui, state);
         show_camera(ui, state);

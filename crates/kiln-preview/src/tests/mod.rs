@@ -16,6 +16,7 @@ mod offscreen;
 mod panels;
 mod parameters;
 mod pure;
+mod requests;
 mod sun;
 mod swap;
 mod themes;

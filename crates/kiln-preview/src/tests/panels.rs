@@ -121,7 +121,7 @@ fn offered(name: &str, ty: &str, widget: Widget, first: Vec<f64>) -> OfferedPara
     OfferedParameter { shader, name, ty, is_override: false, widget, first, label }
 }
 
-fn state_with_parameters() -> PanelState {
+pub(super) fn state_with_parameters() -> PanelState {
     let mut state = state();
     let names = vec!["flat".to_owned(), "smooth".to_owned()];
     state.report.parameters = vec![
@@ -134,7 +134,7 @@ fn state_with_parameters() -> PanelState {
 }
 
 /// What the parameters of the state are set to.
-fn values(state: &PanelState) -> Vec<Vec<f64>> {
+pub(super) fn values(state: &PanelState) -> Vec<Vec<f64>> {
     state.report.parameters.iter().map(|parameter| state.view.parameters.of(parameter)).collect()
 }
 

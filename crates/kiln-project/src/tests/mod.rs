@@ -7,6 +7,7 @@ use kiln_image::{Image, ktx2};
 
 use crate::*;
 
+mod add;
 mod config;
 mod demand;
 mod edits;
@@ -14,6 +15,7 @@ mod effects;
 mod outputs;
 mod outside;
 mod wishes;
+mod write_back;
 
 const TOML: &str = r#"version = 1
 [project]

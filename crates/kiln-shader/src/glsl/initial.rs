@@ -1,12 +1,16 @@
 //! Initial values of uniforms, which WGSL has not: they become first values of the author's parameters.
 
+use std::ops::Range;
+
 use super::Parsed;
 use super::bindings;
 use super::builtin;
 use super::condition;
 use super::declare::{Item, Variable};
 use super::lex::{self, Kind, Token};
+use super::source::Sources;
 use crate::names::Group;
+use crate::parameter::FirstPlace;
 
 /// The uniforms of the stages with an initial value that is kept, component by component.
 pub fn values(stages: &[Parsed]) -> Vec<(&Variable, Vec<f64>)> {
@@ -30,6 +34,27 @@ pub fn value(variable: &Variable) -> Option<Vec<f64>> {
         [all] => Some(vec![all; count]),
         _ => Some(numbers).filter(|numbers| numbers.len() == count),
     }
+}
+
+/// Where the literals of an initial value stand. What a macro gave stands nowhere.
+pub fn place(sources: &Sources<'_, '_>, variable: &Variable) -> FirstPlace {
+    let file = &sources.files[variable.name.place.file];
+    let tokens = variable.initial.as_deref().unwrap_or_default();
+    let mut literals: Vec<Range<usize>> = Vec::new();
+    for (at, token) in tokens.iter().enumerate().filter(|(_, token)| literal(token).is_some()) {
+        let stands = |token: &Token| {
+            let place = token.place;
+            place.file == variable.name.place.file
+                && file.text.get(place.start..place.end) == Some(&token.text)
+        };
+        if !stands(token) {
+            return FirstPlace::default();
+        }
+        let minus =
+            at.checked_sub(1).map(|before| &tokens[before]).filter(|token| token.is("-") && stands(token));
+        literals.push(minus.map_or(token.place.start, |minus| minus.place.start)..token.place.end);
+    }
+    FirstPlace { path: file.path.clone(), literals, ..FirstPlace::default() }
 }
 
 /// A literal, or a constructor of literals.

@@ -100,10 +100,7 @@ pub fn compile(program: &Program, features: &BTreeSet<String>, lints: bool, read
     let stages = load(&mut sources, program, features, &mut named);
     let mut translated = if has_errors(&sources) { None } else { translate(&mut sources, &stages, lints) };
     if let Some((compiled, _)) = &mut translated {
-        let mut annotations = annotations(&mut sources, &stages);
-        for (variable, value) in initial::values(&stages) {
-            parameter::give_first(&mut annotations, &variable.name.text, variable.ty.is("bool"), value);
-        }
+        let annotations = annotations(&mut sources, &stages);
         compiled.reflection.parameters = parameter::parameters(&compiled.reflection, annotations);
     }
     let Sources { dependencies, diagnostics: found, .. } = sources;
@@ -119,7 +116,18 @@ pub fn compile(program: &Program, features: &BTreeSet<String>, lints: bool, read
     Outcome { compiled, source_map, diagnostics, dependencies, features: named, is_library: false }
 }
 
-/// Each file's, though it may be included more than once.
+/// The annotations of a program that need not be valid.
+pub fn program_annotations(
+    program: &Program,
+    features: &BTreeSet<String>,
+    read: &mut Read<'_>,
+) -> Vec<parameter::Annotation> {
+    let mut sources = Sources::new(read);
+    let stages = load(&mut sources, program, features, &mut BTreeSet::new());
+    annotations(&mut sources, &stages)
+}
+
+/// Each file's, though it may be included more than once, and the initial values of uniforms.
 fn annotations(sources: &mut Sources<'_, '_>, stages: &[Parsed]) -> Vec<parameter::Annotation> {
     let tokens = stages.iter().flat_map(|stage| &stage.tokens);
     let kept: BTreeSet<(&str, usize)> =
@@ -133,6 +141,10 @@ fn annotations(sources: &mut Sources<'_, '_>, stages: &[Parsed]) -> Vec<paramete
                 parameter::annotations(&file.path, &file.text, is_kept, &mut sources.diagnostics)
             });
         }
+    }
+    for (variable, value) in initial::values(stages) {
+        let (is_flag, place) = (variable.ty.is("bool"), initial::place(sources, variable));
+        parameter::give_first(&mut found, &variable.name.text, is_flag, value, place);
     }
     found
 }

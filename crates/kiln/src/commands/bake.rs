@@ -130,6 +130,7 @@ pub(crate) fn progress_bar() -> ProgressBar {
 pub(crate) fn show_progress(bar: &ProgressBar) -> impl Fn(Progress) + Sync + '_ {
     |progress| match progress {
         Progress::Started { name, .. } => bar.set_message(name.to_owned()),
+        Progress::UrgentSettled { .. } => {}
         Progress::Settled { done, total } => {
             bar.set_length(total as u64);
             bar.set_position(done as u64);

@@ -146,7 +146,10 @@ impl Demo {
                     self.shown = revision.table.number;
                     return Ok((revision, unix_ms()));
                 }
-                ClientEvent::Revision(_) | ClientEvent::Connected { .. } | ClientEvent::Progress { .. } => {}
+                ClientEvent::Revision(_)
+                | ClientEvent::Connected { .. }
+                | ClientEvent::Progress { .. }
+                | ClientEvent::Answer(_) => {}
                 ClientEvent::Disconnected { reason } => bail!("the daemon went away: {reason}"),
             }
         }

@@ -1,5 +1,6 @@
 //! One module a command.
 
+pub(crate) mod add;
 pub(crate) mod bake;
 pub(crate) mod cube_picture;
 pub(crate) mod demand;
@@ -16,6 +17,7 @@ pub(crate) mod plan;
 pub(crate) mod preview;
 #[cfg(feature = "preview")]
 pub(crate) mod render;
+pub(crate) mod set;
 pub(crate) mod shader;
 pub(crate) mod status;
 pub(crate) mod stop;

@@ -105,7 +105,7 @@ fn follow(
         match event {
             ClientEvent::Connected { project } => say!("connected to {project}"),
             ClientEvent::Disconnected { reason } => say!("waiting: {reason}"),
-            ClientEvent::Progress { .. } => {}
+            ClientEvent::Progress { .. } | ClientEvent::Answer(_) => {}
             ClientEvent::Revision(revision) => {
                 let received_unix_ms = unix_ms();
                 let applied = viewer.apply(&revision);

@@ -292,8 +292,8 @@ impl<'a> Session<'a> {
     }
 
     fn probe(&mut self, pixel: [u32; 2]) -> anyhow::Result<PixelProbe> {
+        let [width, height] = self.viewer.size();
         let outside = || {
-            let [width, height] = self.args.size;
             let [x, y] = pixel;
             place::WrongInput(format!(
                 "the pixel {x},{y} is outside of the picture of {width}x{height} pixels"

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use anyhow::Context as _;
 use kiln_daemon::{Daemon, DaemonError, DaemonOptions, Notice, StopHandle};
-use kiln_link::ServerEvent;
+use kiln_link::{Ask, ServerEvent};
 use serde_json::json;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
@@ -91,6 +91,7 @@ impl Screen {
             ServerEvent::StopAsked => say!("asked to end"),
             // What follows of it is told.
             ServerEvent::Wants { .. } => {}
+            ServerEvent::Asked { client, request } => say!("client {client} asks to {}", asked(&request.ask)),
             ServerEvent::Frame { client, report } => {
                 let since =
                     if self.noticed_unix_ms > 0.0 { self.noticed_unix_ms } else { self.published_unix_ms };
@@ -113,6 +114,7 @@ fn to_json(notice: &Notice) -> serde_json::Value {
             "event": "published",
             "revision": table.number,
             "work": table.work,
+            "building": table.building,
             "diagnostics": table.diagnostics,
             "targets": table.targets.iter().map(|(name, target)| {
                 (name.clone(), json!({"state": target.state, "sha256": target.digest(), "bytes": target.bytes()}))
@@ -131,5 +133,21 @@ fn to_json(notice: &Notice) -> serde_json::Value {
         }
         Notice::Client(ServerEvent::Wants { client }) => json!({"event": "client wants", "client": client}),
         Notice::Client(ServerEvent::StopAsked) => json!({"event": "stop asked"}),
+        Notice::Client(ServerEvent::Asked { client, request }) => {
+            json!({"event": "asked", "client": client, "request": request})
+        }
+    }
+}
+
+/// What a client asks for, after "asks to".
+fn asked(ask: &Ask) -> String {
+    match ask {
+        Ask::WriteParameters { parameters } => {
+            let names: Vec<String> =
+                parameters.iter().map(|write| format!("{}.{}", write.shader, write.name)).collect();
+            format!("write {}", names.join(", "))
+        }
+        Ask::AddFiles { paths } => format!("add {}", paths.join(", ")),
+        Ask::Unknown => "do something that this Kiln does not know".to_owned(),
     }
 }
