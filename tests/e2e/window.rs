@@ -45,6 +45,26 @@ fn window_shows_revisions_and_outlives_the_daemon() {
 }
 
 #[test]
+fn window_that_loses_its_device_is_opened_anew_as_it_was() {
+    let Some(display) = Display::open() else { return skip("window", "Xvfb is not installed") };
+    let project = Project::sample();
+    let watch = project.watch();
+    watch.published();
+    let mut command = project.command(&["preview", "DIR", "--env", "studio", "--exposure", "1.5"]);
+    command.args(["--lose-device-after-frames", "3"]);
+    command.env("DISPLAY", &display.name).env_remove("WAYLAND_DISPLAY");
+    let mut window = Process(command.spawn().unwrap());
+    for _ in 0..2 {
+        assert_eq!(watch.wait_for("client connected")["name"], "preview, window");
+        assert_eq!(watch.wait_for("frame")["report"]["revision"], 1);
+    }
+    assert!(window.0.try_wait().unwrap().is_none(), "the window must be open again");
+    let saved = written_into(&project.beside("state/kiln/windows"));
+    assert_eq!(saved["look"]["selection"]["env"], "studio", "{saved}");
+    assert_eq!(saved["look"]["view"]["exposure_ev"], 1.5, "{saved}");
+}
+
+#[test]
 fn window_remembers_how_it_was_and_headless_runs_do_not() {
     let Some(display) = Display::open() else { return skip("window", "Xvfb is not installed") };
     let project = Project::sample();

@@ -53,6 +53,7 @@ mod lights;
 mod live_picture;
 mod live_probe;
 mod look;
+mod loss;
 mod material_list;
 mod measurer;
 mod memory;

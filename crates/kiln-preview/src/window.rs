@@ -12,6 +12,7 @@ use kiln_link::{ClientEvent, Revision};
 use crate::connection::{Connection, Heard};
 use crate::frame_watcher::{Finished, FrameWatcher};
 use crate::live_picture::LivePicture;
+use crate::loss::{LossSlot, Opening, survive_losses};
 use crate::panel::{self, PanelState, Progress};
 use crate::parameter::ParameterValues;
 use crate::saved::{Saved, SavedFile};
@@ -36,6 +37,8 @@ pub struct WindowOptions {
     pub pictures: PathBuf,
     /// File in which the window remembers how it was; `None` = nothing is read or written.
     pub state: Option<PathBuf>,
+    /// Loses the device on purpose after so many frames of a revision: how a window survives that can be tried.
+    pub lose_device_after_frames: Option<u32>,
 }
 
 /// Device errors kept on screen.
@@ -46,10 +49,16 @@ const DEVICE_ERRORS_SHOWN_MAX: usize = 8;
 /// # Errors
 /// No display, or no device that can draw to it.
 pub fn run_window(options: WindowOptions) -> anyhow::Result<()> {
-    let title = options.title.clone();
     let (read, note) = options.state.as_deref().map_or_else(Default::default, Saved::read);
     let saved = read.clone().with_given(&options.selection, &options.view);
-    let size = saved.layout.window_points.unwrap_or(options.size);
+    let file = options.state.clone().map(|path| SavedFile::new(path, read));
+    survive_losses(Opening { options, saved, file, note })
+}
+
+/// Opens one window and returns when it is closed, by the user or because its device is lost.
+pub(crate) fn open_window(opening: Opening, loss: &Arc<LossSlot>) -> anyhow::Result<()> {
+    let title = opening.options.title.clone();
+    let size = opening.saved.layout.window_points.unwrap_or(opening.options.size);
     let native = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title(title.clone())
@@ -67,9 +76,10 @@ pub fn run_window(options: WindowOptions) -> anyhow::Result<()> {
         persist_window: false,
         ..Default::default()
     };
+    let loss = Arc::clone(loss);
     let open = Box::new(move |context: &eframe::CreationContext<'_>| {
-        let file = options.state.clone().map(|path| SavedFile::new(path, read));
-        let mut window = Window::new(context, options, file)?;
+        let Opening { options, saved, file, note } = opening;
+        let mut window = Window::new(context, options, file, loss)?;
         context.egui_ctx.set_zoom_factor(saved.layout.zoom);
         saved.restore(&mut window.panels);
         window.panels.window_notes.extend(note);
@@ -93,6 +103,9 @@ struct Window {
     /// The newest revision, while an older one is held.
     waiting: Option<(Arc<Revision>, f64)>,
     saved: Option<SavedFile>,
+    loss: Arc<LossSlot>,
+    /// Frames until the device is lost on purpose.
+    frames_left: Option<u32>,
 }
 
 impl Window {
@@ -100,6 +113,7 @@ impl Window {
         context: &eframe::CreationContext<'_>,
         options: WindowOptions,
         saved: Option<SavedFile>,
+        loss: Arc<LossSlot>,
     ) -> anyhow::Result<Self> {
         theme::apply(&context.egui_ctx);
         let render_state = context.wgpu_render_state.clone().context("the window has no wgpu device")?;
@@ -132,6 +146,8 @@ impl Window {
             told_wants: Vec::new(),
             waiting: None,
             saved,
+            loss,
+            frames_left: options.lose_device_after_frames,
         })
     }
 
@@ -211,6 +227,17 @@ impl Window {
         }
     }
 
+    fn lose_device_on_purpose(&mut self, context: &egui::Context) {
+        if let Some(left) = self.frames_left.as_mut().filter(|_| self.panels.report.revision > 0) {
+            *left = left.saturating_sub(1);
+            context.request_repaint();
+            if *left == 0 {
+                self.frames_left = None;
+                self.gpu.device.destroy();
+            }
+        }
+    }
+
     /// What has to be prepared.
     fn wanted(&self) -> (Selection, ParameterValues) {
         (self.panels.selection.clone(), self.panels.view.parameters.overrides())
@@ -232,6 +259,12 @@ impl Window {
 impl eframe::App for Window {
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
         self.take_news();
+        if let Some(reason) = self.gpu.lost() {
+            // Nothing is drawn: egui's renderer could not.
+            self.loss.note(reason, Saved::of(&self.panels));
+            return ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
+        }
+        self.loss.keep(&self.gpu, Saved::of(&self.panels));
         let Window { panels, picture, .. } = self;
         panel::show(ui, panels, |ui, state| picture.show(ui, state));
         self.let_go();
@@ -241,6 +274,7 @@ impl eframe::App for Window {
             self.request();
         }
         self.tell_wants();
+        self.lose_device_on_purpose(ui.ctx());
     }
 
     fn on_exit(&mut self) {

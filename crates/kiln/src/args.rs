@@ -416,6 +416,9 @@ pub(crate) struct PreviewArgs {
     /// Do not remember how the window was, and open it as at first
     #[arg(long, conflicts_with = "headless")]
     pub(crate) fresh: bool,
+    /// Lose the graphics device on purpose after so many frames, to see the window survive it
+    #[arg(long, hide = true, value_name = "FRAMES", conflicts_with = "headless")]
+    pub(crate) lose_device_after_frames: Option<u32>,
     /// Picture size in pixels
     #[arg(long, default_value = "1280x720", value_parser = parse_size, requires = "headless")]
     pub(crate) size: [u32; 2],

@@ -117,12 +117,15 @@ pub(super) fn show_over(ui: &Ui, place: Rect, state: &mut PanelState) {
     if hovered > 0 {
         let to = if state.project.is_empty() { "the project" } else { &state.project };
         let text = format!("Drop to add to {to}: .hdr .exr .ktx .ktx2 .dds .gltf .glb");
-        show_card(ui, place, "kiln drop", Align2::CENTER_CENTER, theme::of(ui).accent, |ui| _ = ui.label(text));
+        show_card(ui, place, "kiln drop", Align2::CENTER_CENTER, theme::of(ui).accent, |ui| {
+            _ = ui.label(text)
+        });
     }
     let Requests { said, open, .. } = &mut state.requests;
     let Some(answer) = said else {
         if *open > 0 {
-            let show = |ui: &mut Ui| _ = ui.label(RichText::new("asked the daemon …").color(theme::of(ui).weak));
+            let show =
+                |ui: &mut Ui| _ = ui.label(RichText::new("asked the daemon …").color(theme::of(ui).weak));
             show_card(ui, place, "kiln answer", Align2::RIGHT_TOP, theme::of(ui).line, show);
         }
         return;

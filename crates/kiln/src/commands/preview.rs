@@ -49,6 +49,7 @@ pub(crate) fn run(args: &PreviewArgs) -> anyhow::Result<ExitCode> {
         view,
         pictures: args.out.clone().unwrap_or_else(|| folder.join(PICTURES)),
         state,
+        lose_device_after_frames: args.lose_device_after_frames,
     })?;
     Ok(ExitCode::SUCCESS)
 }
