@@ -48,8 +48,11 @@ fn cover(left: f32) {
 }
 
 // With alpha 0 where this variant has no such value: nothing is drawn there then.
-fn inspected(radiance: vec3f, alpha: f32) -> vec4f {
-    switch inspect.channel {
+// `pixel` is where it is, in pixels.
+fn inspected(radiance: vec3f, alpha: f32, pixel: vec2f) -> vec4f {
+    // Pixels are not negative: this is the channel. Why it is asked of them too, `pbr::tonemap` says.
+    let channel = inspect.channel + u32(max(-pixel.x, 0.0));
+    switch channel {
         case CHANNEL_FAULTS: { return faults(radiance, inspect.radiance_max); }
         case CHANNEL_BASE_COLOR: { return vec4f(seen.base_color.rgb, 1.0); }
         case CHANNEL_ALPHA: { return vec4f(vec3f(seen.base_color.a), 1.0); }
@@ -59,14 +62,14 @@ fn inspected(radiance: vec3f, alpha: f32) -> vec4f {
         case CHANNEL_VARIANT: { return vec4f(inspect.variant_color, 1.0); }
         default: {
             @if(unlit) return vec4f(0.0);
-            @else return inspected_lit(alpha);
+            @else return inspected_lit(channel, alpha);
         }
     }
 }
 
 @if(!unlit)
-fn inspected_lit(alpha: f32) -> vec4f {
-    switch inspect.channel {
+fn inspected_lit(channel: u32, alpha: f32) -> vec4f {
+    switch channel {
         case CHANNEL_ROUGHNESS: { return vec4f(vec3f(seen.roughness), 1.0); }
         case CHANNEL_METALNESS: { return vec4f(vec3f(seen.metalness), 1.0); }
         case CHANNEL_OCCLUSION: { return vec4f(vec3f(seen.occlusion), 1.0); }

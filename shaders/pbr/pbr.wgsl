@@ -224,7 +224,7 @@ fn fs_main(in: Varying, @builtin(front_facing) front_facing: bool) -> @location(
     @if(inspect) {
         seen.uv0 = in.uv0;
         seen.uv1 = in.uv1;
-        return inspected(radiance, alpha);
+        return inspected(radiance, alpha, in.clip_position.xy);
     }
     @else return vec4f(within_f16(radiance), alpha);
 }

@@ -5,18 +5,18 @@ use std::process::Output;
 use crate::harness::{Project, skip, text};
 
 /// What the sample's tonemap has of its own after [`project`].
-const MEMBERS: &str = "struct Params {
+const PARAMETERS: &str = "override contrast: f32 = 1.0; // @slider(0.5, 2)
+struct Params {
     white_balance: vec3f, // @color(1, 1, 1) of the light
     is_grey: u32,         // @toggle(false)
-";
-const OVERRIDE: &str = "override contrast: f32 = 1.0; // @slider(0.5, 2)";
+}
+@group(3) @binding(0) var<uniform> params: Params;";
 
 /// The sample with a tonemap that offers three parameters more.
 fn project() -> Project {
     let project = Project::sample();
     let tonemap = "shaders/pbr/tonemap.wgsl";
-    project.edit(tonemap, "struct Params {\n", MEMBERS);
-    project.edit(tonemap, "const WHITE_BALANCE = vec3f(1.0, 1.0, 1.0);", OVERRIDE);
+    project.edit(tonemap, "const WHITE_BALANCE = vec3f(1.0, 1.0, 1.0);", PARAMETERS);
     let graded = "select(radiance * params.white_balance, radiance.ggg, params.is_grey != 0u) * contrast";
     project.edit(tonemap, "radiance * WHITE_BALANCE", graded);
     project

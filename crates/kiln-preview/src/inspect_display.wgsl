@@ -21,8 +21,9 @@ fn to_srgb(linear: vec3f) -> vec3f {
     return select(curve, 12.92 * x, x <= vec3f(0.0031308));
 }
 
-fn encoded(value: vec3f) -> vec3f {
-    switch display.encoding {
+fn encoded(value: vec3f, pixel: vec2f) -> vec3f {
+    // Pixels are not negative. Branches that hang on uniforms alone make lavapipe compile anew for each frame.
+    switch display.encoding + u32(max(-pixel.x, 0.0)) {
         case 0u: { return to_srgb(value); }
         case 2u: { return saturate(value * 0.5 + 0.5); }
         case 3u: { return vec3f(fract(value.xy), 0.0); }
@@ -44,6 +45,6 @@ fn fs_main(@builtin(position) position: vec4f) -> @location(0) vec4f {
     if !(texel.a > 0.0) {
         return vec4f(nothing, 1.0);
     }
-    let value = encoded(texel.rgb / texel.a);
+    let value = encoded(texel.rgb / texel.a, position.xy);
     return vec4f(mix(nothing, value, saturate(texel.a)), 1.0);
 }

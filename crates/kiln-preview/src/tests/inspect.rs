@@ -22,7 +22,7 @@ fn matte(roughness: f32) -> Value {
 }
 
 /// A viewer of the ball, whose shaders can show channels.
-fn viewer(sphere: &Sphere) -> Option<HeadlessViewer> {
+pub(super) fn viewer(sphere: &Sphere) -> Option<HeadlessViewer> {
     let mut viewer = HeadlessViewer::new(gpu()?, SIZE);
     let glb = sphere.glb();
     let scene = kiln_scene::load(&glb).expect("what was packed loads");
@@ -116,7 +116,7 @@ fn normals_are_those_of_the_sphere_where_the_probe_says_it_is() {
     }
 }
 
-fn layered() -> Sphere {
+pub(super) fn layered() -> Sphere {
     let material = json!({
         "pbrMetallicRoughness": { "metallicFactor": 0.2, "roughnessFactor": 0.4, "baseColorFactor": [0.8, 0.4, 0.2, 1.0] },
         "emissiveFactor": [0.1, 0.2, 0.3],

@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 
 use super::corpus::say;
 use super::fixture::{Build, SIX_COLORS, gpu, sphere_glb};
+use crate::channel::Channel;
 use crate::parameter::ParameterValues;
 use crate::prepare::Preparer;
 use crate::renderer::Renderer;
@@ -227,4 +228,31 @@ fn check_of_memory_sees_a_swap_that_is_kept() {
     }
     let now = gpu.memory_bytes().expect("as before");
     assert!(now > before + before / 20 + 3 * 6 * 8 * 64 * 64, "{before} bytes became {now}");
+}
+
+#[test]
+fn frames_of_lights_and_channels_keep_nothing() {
+    let Some(mut viewer) = super::inspect::viewer(&super::inspect::layered()) else { return };
+    let asked = std::env::var("KILN_SWAPS").ok().and_then(|text| text.parse::<usize>().ok());
+    let count = asked.map_or(3, |asked| asked.min(200));
+    for channel in [None, Some(Channel::Roughness), Some(Channel::Specular)] {
+        viewer.view.channel = channel;
+        let mut resident = Vec::new();
+        let start = Instant::now();
+        for _ in 0..2 {
+            for _ in 0..count {
+                viewer.draw().expect("the device draws");
+            }
+            resident.push(memory(viewer.gpu())[1]);
+        }
+        let frame_ms = start.elapsed().as_secs_f64() * 1e3 / (2 * count) as f64;
+        let megabytes: Vec<f64> = resident.iter().flatten().map(|bytes| *bytes as f64 / 1e6).collect();
+        say(&format!(
+            "{channel:?}: {frame_ms:.1} ms a frame; process: {megabytes:.1?} MB after {count} and as many more"
+        ));
+        // Other tests share the process unless this one was asked for.
+        if let ([Some(first), Some(second)], Some(_)) = (&resident[..], asked) {
+            assert!(*second <= first + 8_000_000, "{first} bytes became {second}");
+        }
+    }
 }
