@@ -26,7 +26,7 @@ pub fn built_in(name: &str) -> Option<Vec<u8>> {
     let (surface, is_double_sided) = match name {
         "sphere" => (lathe(&sphere()), false),
         "plane" => (sheet(1, |u, v| DVec3::new(u - 0.5, 0.0, v - 0.5) * 2.0), true),
-        "cloth" => (sheet(STEPS, cloth), true),
+        "cloth" => (sheet(2 * STEPS, cloth), true),
         "knob" => (lathe(&knob()), false),
         _ => return None,
     };

@@ -35,10 +35,10 @@ pub(super) fn show_over(ui: &Ui, place: Rect, state: &mut PanelState) {
         theme::card_frame(ui, theme::of(ui).accent).show(ui, |ui| {
             let text = format!("revision {} is held", state.report.revision);
             ui.label(RichText::new(text).color(theme::of(ui).accent));
-            if let Some(waiting) = state.hold.waiting {
-                if ui.button(format!("Go to revision {waiting}")).on_hover_text("L").clicked() {
-                    state.hold.is_on = false;
-                }
+            if let Some(waiting) = state.hold.waiting
+                && ui.button(format!("Go to revision {waiting}")).on_hover_text("L").clicked()
+            {
+                state.hold.is_on = false;
             }
         });
     });

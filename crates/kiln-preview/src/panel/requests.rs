@@ -118,7 +118,7 @@ pub(super) fn show_over(ui: &Ui, place: Rect, state: &mut PanelState) {
         let to = if state.project.is_empty() { "the project" } else { &state.project };
         let text = format!("Drop to add to {to}: .hdr .exr .ktx .ktx2 .dds .gltf .glb");
         show_card(ui, place, "kiln drop", Align2::CENTER_CENTER, theme::of(ui).accent, |ui| {
-            _ = ui.label(text)
+            _ = ui.label(text);
         });
     }
     let Requests { said, open, .. } = &mut state.requests;

@@ -134,7 +134,7 @@ fn damaged_memory_of_a_window_is_the_default_with_a_note() {
         std::fs::write(&path, &text).expect("the folder can be written");
         let (read, note) = Saved::read(&path);
         assert_eq!(read, Saved::default());
-        assert!(note.is_some_and(|note| note.contains("window.json")), "no note for {:.60}", text);
+        assert!(note.is_some_and(|note| note.contains("window.json")), "no note for {text:.60}");
     }
     std::fs::write(&path, whole.to_string()).expect("the folder can be written");
     assert_eq!(Saved::read(&path).1, None, "the whole one is read");
