@@ -4,11 +4,14 @@ use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, Parser, Subcommand};
 
+#[cfg(feature = "preview")]
 mod inspect;
+#[cfg(feature = "preview")]
 mod render;
 mod shader;
 mod sources;
 
+#[cfg(feature = "preview")]
 pub(crate) use render::*;
 pub(crate) use shader::*;
 pub(crate) use sources::*;
@@ -448,7 +451,6 @@ pub(crate) struct PreviewArgs {
     pub(crate) json: bool,
 }
 
-#[cfg(feature = "preview")]
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "\
 Examples:

@@ -58,8 +58,8 @@ fn diffuse_paths_agree_with_brute_force_under_noise_and_under_a_sun() {
         let [bright, dark] =
             [0.9, 0.1].map(|color| tracer.radiance(dielectric(color), NORMAL, NORMAL, COUNT, 2));
         let irradiance = reference_radiance(&map, Lobe::Lambert, NORMAL);
-        for i in 0..3 {
-            let ratio = (bright.radiance[i] - dark.radiance[i]) / (0.8 * left * irradiance[i]);
+        for (i, irradiance) in irradiance.into_iter().enumerate() {
+            let ratio = (bright.radiance[i] - dark.radiance[i]) / (0.8 * left * irradiance);
             assert!((ratio - 1.0).abs() <= 0.01, "{ratio}: {bright:?}, {dark:?}");
         }
     }
