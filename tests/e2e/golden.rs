@@ -64,25 +64,38 @@ fn sample_through_each_tone_curve() {
     }
 }
 
-fn check(name: &str, actual: &RgbImage, adapter: &str) {
-    let path = golden_folder().join(format!("{name}.png"));
+pub fn check(name: &str, actual: &RgbImage, adapter: &str) {
     if std::env::var_os("KILN_UPDATE_GOLDEN").is_some() {
-        actual.save(&path).unwrap();
+        actual.save(golden_path(name)).unwrap();
         return;
     }
-    let expected = image::open(&path)
-        .unwrap_or_else(|error| panic!("{}: {error}; record it with KILN_UPDATE_GOLDEN=1", path.display()))
-        .to_rgb8();
-    let is_same_driver = adapter.contains("llvmpipe") && adapter.contains("22.3.6");
-    let tolerance = if is_same_driver { TOLERANCE_SAME_DRIVER } else { TOLERANCE_OTHER_DRIVER };
-    if let Err(reason) = compare(&expected, actual, tolerance) {
+    let expected = expected(name);
+    if let Err(reason) = compare(&expected, actual, tolerance_of(adapter)) {
         let shown = show_difference(name, &expected, actual);
         panic!("{name} on {adapter}: {reason}; expected | difference | actual: {}", shown.display());
     }
 }
 
-fn golden_folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/golden")
+/// The recorded frame.
+pub fn expected(name: &str) -> RgbImage {
+    let path = golden_path(name);
+    let read = image::open(&path);
+    read.unwrap_or_else(|error| panic!("{}: {error}; record it with KILN_UPDATE_GOLDEN=1", path.display()))
+        .to_rgb8()
+}
+
+/// Whether a frame passes for another.
+pub fn is_within_tolerance(expected: &RgbImage, actual: &RgbImage, adapter: &str) -> bool {
+    compare(expected, actual, tolerance_of(adapter)).is_ok()
+}
+
+fn tolerance_of(adapter: &str) -> Tolerance {
+    let is_same_driver = adapter.contains("llvmpipe") && adapter.contains("22.3.6");
+    if is_same_driver { TOLERANCE_SAME_DRIVER } else { TOLERANCE_OTHER_DRIVER }
+}
+
+fn golden_path(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/golden").join(format!("{name}.png"))
 }
 
 fn difference(a: &Rgb<u8>, b: &Rgb<u8>) -> u8 {

@@ -15,6 +15,8 @@ mod environments;
 mod faults;
 #[cfg(feature = "preview")]
 mod golden;
+#[cfg(feature = "preview")]
+mod golden_effects;
 mod harness;
 #[cfg(feature = "preview")]
 mod inspect;
