@@ -25,8 +25,9 @@ pub(crate) struct Heard {
 #[derive(Debug)]
 pub(crate) struct Connection {
     heard: Receiver<Heard>,
-    reports: Option<Sender<FrameReport>>,
-    wants: Sender<Vec<String>>,
+    reports: Sender<FrameReport>,
+    /// Its end tells the thread that the window is gone: others keep senders of reports.
+    wants: Option<Sender<Vec<String>>>,
     thread: Option<JoinHandle<()>>,
     requests: Sender<Ask>,
 }
@@ -47,7 +48,7 @@ impl Connection {
                 wake,
             );
         })?;
-        Ok(Connection { heard, reports: Some(reports), wants, thread: Some(thread), requests })
+        Ok(Connection { heard, reports, wants: Some(wants), thread: Some(thread), requests })
     }
 
     /// The oldest event not yet taken.
@@ -58,7 +59,7 @@ impl Connection {
     /// Tells the daemon what is shown: its contents come first.
     pub fn want(&self, targets: Vec<String>) {
         // The thread ends only with the window.
-        drop(self.wants.send(targets));
+        self.wants.iter().for_each(|wants| drop(wants.send(targets.clone())));
     }
 
     /// Asks the daemon to change the project; the answer is heard as [`ClientEvent::Answer`].
@@ -68,14 +69,14 @@ impl Connection {
     }
 
     /// Where finished frames are reported.
-    pub fn reports(&self) -> Option<Sender<FrameReport>> {
+    pub fn reports(&self) -> Sender<FrameReport> {
         self.reports.clone()
     }
 }
 
 impl Drop for Connection {
     fn drop(&mut self) {
-        drop(self.reports.take());
+        drop(self.wants.take());
         if let Some(thread) = self.thread.take() {
             // It has nothing to return.
             drop(thread.join());
@@ -110,8 +111,12 @@ fn forward(client: &Client, heard: &Sender<Heard>, told: &Told, wake: impl Fn())
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => return,
         }
-        if let Some(targets) = told.wanted.try_iter().last() {
-            client.want(targets);
+        loop {
+            match told.wanted.try_recv() {
+                Ok(targets) => client.want(targets),
+                Err(TryRecvError::Empty) => break,
+                Err(TryRecvError::Disconnected) => return,
+            }
         }
         for ask in told.asked.try_iter() {
             // Nobody else will answer it.
@@ -123,15 +128,9 @@ fn forward(client: &Client, heard: &Sender<Heard>, told: &Told, wake: impl Fn())
                 wake();
             }
         }
-        loop {
-            match told.reported.try_recv() {
-                Ok(report) => {
-                    newest_reported = report.revision;
-                    client.report_frame(report);
-                }
-                Err(TryRecvError::Empty) => break,
-                Err(TryRecvError::Disconnected) => return,
-            }
+        for report in told.reported.try_iter() {
+            newest_reported = report.revision;
+            client.report_frame(report);
         }
     }
 }

@@ -1,13 +1,12 @@
 //! What becomes of the window when its graphics device is lost: a driver that was reset or renewed, a card that was pulled out.
 //!
-//! egui's renderer lives as long as its device, so the window is closed and opened anew on a new one, as it was.
+//! egui's renderer lives as long as its device, so the window is closed and opened anew on a new one, as it was. A device that goes
+//! while egui writes its buffers, between a frame's panels and its submission, ends the program: egui's renderer panics there.
 
-use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use anyhow::bail;
-use kiln_gpu::Gpu;
 
 use crate::saved::{Saved, SavedFile};
 use crate::window::{WindowOptions, open_window};
@@ -26,68 +25,36 @@ pub(crate) struct Opening {
     pub note: Option<String>,
 }
 
-/// What is kept of a window in case its device is lost.
+/// Why a window closed by itself, and how it was.
 #[derive(Debug, Default)]
-pub(crate) struct LossSlot(Mutex<Kept>);
-
-#[derive(Debug, Default)]
-struct Kept {
-    gpu: Option<Gpu>,
-    saved: Option<Saved>,
-    reason: Option<String>,
-}
+pub(crate) struct LossSlot(Mutex<Option<(String, Saved)>>);
 
 impl LossSlot {
-    fn lock(&self) -> MutexGuard<'_, Kept> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// How the window is now.
-    pub fn keep(&self, gpu: &Gpu, saved: Saved) {
-        let mut kept = self.lock();
-        kept.gpu.get_or_insert_with(|| gpu.clone());
-        kept.saved = Some(saved);
-    }
-
     /// The device is lost, and the window about to close.
     pub fn note(&self, reason: String, saved: Saved) {
-        let mut kept = self.lock();
-        (kept.reason, kept.saved) = (Some(reason), Some(saved));
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some((reason, saved));
     }
 
-    /// Why the device was lost, if it was, and how the window was.
-    fn take(&self) -> Option<(String, Option<Saved>)> {
-        let Kept { gpu, saved, reason } = std::mem::take(&mut *self.lock());
-        let reason = reason.or_else(|| {
-            let gpu = gpu?;
-            // The loss is told to whoever asks the device next.
-            drop(gpu.device.poll(wgpu::PollType::Poll));
-            gpu.lost()
-        });
-        Some((reason?, saved))
+    fn take(&self) -> Option<(String, Saved)> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 }
 
 /// Opens windows until the user closes one.
-pub(crate) fn survive_losses(opening: Opening) -> anyhow::Result<()> {
-    let Opening { mut options, mut saved, mut file, mut note } = opening;
+pub(crate) fn survive_losses(mut opening: Opening) -> anyhow::Result<()> {
+    let mut options = opening.options.clone();
+    options.lose_device_after_frames = None;
     let mut short_lives = 0;
     loop {
         let (loss, begun) = (Arc::new(LossSlot::default()), Instant::now());
-        let opening =
-            Opening { options: options.clone(), saved: saved.clone(), file: file.take(), note: note.take() };
-        // egui's renderer panics where a lost device gives it no memory: a window of which nothing is kept but what it was like.
-        let closed = catch_unwind(AssertUnwindSafe(|| open_window(opening, &loss)));
-        let Some((reason, last)) = loss.take() else {
-            return closed.unwrap_or_else(|panic| resume_unwind(panic));
-        };
+        open_window(opening, &loss)?;
+        let Some((reason, saved)) = loss.take() else { return Ok(()) };
         short_lives = if begun.elapsed() < LASTING { short_lives + 1 } else { 0 };
         if short_lives > SHORT_LIVES_MAX {
             bail!("the graphics device was lost {short_lives} times in a row, at last so: {reason}");
         }
-        saved = last.unwrap_or(saved);
-        file = options.state.clone().map(|path| SavedFile::new(path, saved.clone()));
-        note = Some(format!("the graphics device was lost ({reason}); this window was opened anew"));
-        options.lose_device_after_frames = None;
+        let file = options.state.clone().map(|path| SavedFile::new(path, saved.clone()));
+        let note = Some(format!("the graphics device was lost ({reason}); this window was opened anew"));
+        opening = Opening { options: options.clone(), saved, file, note };
     }
 }

@@ -126,7 +126,7 @@ impl Window {
         let connection =
             Connection::open(options.socket, waker(&context.egui_ctx)).context("starting a thread")?;
         let worker = Worker::spawn(gpu.clone(), waker(&context.egui_ctx)).context("starting a thread")?;
-        let reports = connection.reports().context("the connection is closed")?;
+        let reports = connection.reports();
         let watcher = FrameWatcher::spawn(reports, waker(&context.egui_ctx))?;
         let panels = PanelState::new(gpu.description(), options.selection.clone(), options.view);
         Ok(Window {
@@ -234,6 +234,8 @@ impl Window {
             if *left == 0 {
                 self.frames_left = None;
                 self.gpu.device.destroy();
+                // The loss is told to whoever waits next.
+                drop(self.gpu.wait());
             }
         }
     }
@@ -259,12 +261,12 @@ impl Window {
 impl eframe::App for Window {
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
         self.take_news();
+        self.lose_device_on_purpose(ui.ctx());
         if let Some(reason) = self.gpu.lost() {
             // Nothing is drawn: egui's renderer could not.
             self.loss.note(reason, Saved::of(&self.panels));
             return ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
         }
-        self.loss.keep(&self.gpu, Saved::of(&self.panels));
         let Window { panels, picture, .. } = self;
         panel::show(ui, panels, |ui, state| picture.show(ui, state));
         self.let_go();
@@ -274,7 +276,6 @@ impl eframe::App for Window {
             self.request();
         }
         self.tell_wants();
-        self.lose_device_on_purpose(ui.ctx());
     }
 
     fn on_exit(&mut self) {
