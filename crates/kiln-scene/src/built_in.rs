@@ -26,7 +26,7 @@ pub fn built_in(name: &str) -> Option<Vec<u8>> {
     let (surface, is_double_sided) = match name {
         "sphere" => (lathe(&sphere()), false),
         "plane" => (sheet(1, |u, v| DVec3::new(u - 0.5, 0.0, v - 0.5) * 2.0), true),
-        "cloth" => (sheet(2 * STEPS, cloth), true),
+        "cloth" => (sheet(3 * STEPS / 2, cloth), true),
         "knob" => (lathe(&knob()), false),
         _ => return None,
     };
@@ -132,7 +132,7 @@ fn sheet(steps: usize, place: impl Fn(f64, f64) -> DVec3) -> Surface {
 fn cloth(u: f64, v: f64) -> DVec3 {
     let phase = TAU * (3.5 * u + 0.12 * libm::sin(TAU * 1.3 * u)) + 0.7 * v;
     let depth = 0.03 + 0.15 * libm::sqrt(v.max(0.0) + 0.01);
-    DVec3::new(2.0 * u - 1.0 + 0.04 * v * libm::sin(2.0 * phase), 2.0 * (1.0 - v), depth * libm::sin(phase))
+    DVec3::new(2.0 * u - 1.0 + 0.02 * v * libm::sin(2.0 * phase), 2.0 * (1.0 - v), depth * libm::sin(phase))
 }
 
 impl Surface {
