@@ -131,15 +131,7 @@ impl Bench {
         };
         self.measure("shader save → frame, 640×360", &project.join(SHADER), count, &lines, &edited)?;
 
-        let skies = [20.0, 50.0].map(|elevation: f64| {
-            let other = self.folder.join(format!("sky-{elevation}"));
-            let elevation = elevation.to_string();
-            let mut init = self.kiln("cache");
-            init.arg("init").arg(&other).args(["--panorama-width", "1024", "--sun-elevation", &elevation]);
-            output_of(&mut init).and_then(|_| std::fs::read(other.join("environments/sky.hdr")).map_err(text))
-        });
-        let [low, high] = skies;
-        let skies = [low?, high?];
+        let skies = self.skies()?;
         // One byte of the header's comment differs each time, so that no result is in the cache.
         let edited = |index: usize| with_comment(&skies[index % 2], index);
         let sky = project.join("environments/sky.hdr");
@@ -150,6 +142,19 @@ impl Bench {
             &lines,
             &edited,
         )
+    }
+
+    /// Two panorama files of 1024×512 that differ in where the sun stands.
+    pub(crate) fn skies(&self) -> Result<[Vec<u8>; 2], String> {
+        let skies = [20.0, 50.0].map(|elevation: f64| {
+            let other = self.folder.join(format!("sky-{elevation}"));
+            let elevation = elevation.to_string();
+            let mut init = self.kiln("cache");
+            init.arg("init").arg(&other).args(["--panorama-width", "1024", "--sun-elevation", &elevation]);
+            output_of(&mut init).and_then(|_| std::fs::read(other.join("environments/sky.hdr")).map_err(text))
+        });
+        let [low, high] = skies;
+        Ok([low?, high?])
     }
 
     fn measure(

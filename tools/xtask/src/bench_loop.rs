@@ -6,7 +6,7 @@ use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use crate::bench::{Bench, Running, cores, lines_of, number, text};
-use crate::shell::{cargo, output_of, step};
+use crate::shell::{cargo, step};
 
 const LIMIT: Duration = Duration::from_secs(60);
 const SHADER: &str = "shaders/pbr/tonemap.wgsl";
@@ -48,15 +48,7 @@ pub(crate) fn run(count: usize) -> Result<(), String> {
         shader.replace(CONSTANT, &constant).into_bytes()
     };
     measure("shader", &project.join(SHADER), count, &lines, &edited)?;
-    let skies = [20.0, 50.0].map(|elevation: f64| {
-        let other = bench.folder.join(format!("sky-{elevation}"));
-        let elevation = elevation.to_string();
-        let mut init = bench.kiln("cache");
-        init.arg("init").arg(&other).args(["--panorama-width", "1024", "--sun-elevation", &elevation]);
-        output_of(&mut init).and_then(|_| std::fs::read(other.join("environments/sky.hdr")).map_err(text))
-    });
-    let [low, high] = skies;
-    let skies = [low?, high?];
+    let skies = bench.skies()?;
     let edited = |index: usize| crate::bench::with_comment(&skies[index % 2], index);
     measure("panorama 1024×512", &project.join("environments/sky.hdr"), count, &lines, &edited)
 }

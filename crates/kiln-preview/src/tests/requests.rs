@@ -92,8 +92,8 @@ fn value_that_the_source_says_now_is_no_longer_the_users() {
 #[test]
 fn dropped_files_are_asked_for_with_their_paths() {
     let mut harness = harness(state());
-    drop_files(&mut harness, &["/tmp/sky.hdr".into(), "/tmp/car.glb".into()]);
-    let paths = vec!["/tmp/sky.hdr".to_owned(), "/tmp/car.glb".to_owned()];
+    drop_files(&mut harness, &["/elsewhere/sky.hdr".into(), "/elsewhere/car.glb".into()]);
+    let paths = vec!["/elsewhere/sky.hdr".to_owned(), "/elsewhere/car.glb".to_owned()];
     assert_eq!(harness.state_mut().requests.take(), [Ask::AddFiles { paths }]);
 }
 
