@@ -2,7 +2,7 @@
 
 use kiln_gpu::Gpu;
 
-use crate::program::{DEPTH_FORMAT, HDR_FORMAT, SAMPLE_COUNT};
+use crate::program::{DEPTH_FORMAT, HDR_FORMAT};
 use crate::view::{Background, View, from_srgb};
 
 /// Greys of the checker's squares, sRGB-encoded.
@@ -21,10 +21,10 @@ pub(crate) struct Backdrop {
 }
 
 impl Backdrop {
-    /// Makes the pipeline.
-    pub fn new(gpu: &Gpu) -> Self {
+    /// Makes the pipeline, for so many samples a pixel.
+    pub fn new(gpu: &Gpu, sample_count: u32) -> Self {
         let module = gpu.device.create_shader_module(wgpu::include_wgsl!("backdrop.wgsl"));
-        let pipeline = overlay_pipeline(gpu, &module, "fs_main", None, None);
+        let pipeline = overlay_pipeline(gpu, &module, "fs_main", sample_count, None, None);
         let colors = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("backdrop"),
             size: 32,
@@ -65,6 +65,7 @@ pub(crate) fn overlay_pipeline(
     gpu: &Gpu,
     module: &wgpu::ShaderModule,
     fragment: &str,
+    sample_count: u32,
     blend: Option<wgpu::BlendState>,
     cull_mode: Option<wgpu::Face>,
 ) -> wgpu::RenderPipeline {
@@ -85,7 +86,7 @@ pub(crate) fn overlay_pipeline(
             stencil: wgpu::StencilState::default(),
             bias: wgpu::DepthBiasState::default(),
         }),
-        multisample: wgpu::MultisampleState { count: SAMPLE_COUNT, ..Default::default() },
+        multisample: wgpu::MultisampleState { count: sample_count, ..Default::default() },
         fragment: Some(wgpu::FragmentState {
             module,
             entry_point: Some(fragment),

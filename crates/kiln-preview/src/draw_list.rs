@@ -232,7 +232,7 @@ fn animated_materials(scene: &Scene) -> BTreeSet<usize> {
 /// that order.
 fn rasters(mirrored: bool, material: &Material) -> Vec<Raster> {
     let blend = material.alpha_mode == AlphaMode::Blend;
-    let raster = |cull| Raster { cull, front_face: front_face(mirrored), blend };
+    let raster = |cull| Raster { cull, front_face: front_face(mirrored), blend, ..Raster::FULL_SCREEN };
     match (material.double_sided, blend) {
         (true, true) => vec![raster(Some(wgpu::Face::Front)), raster(Some(wgpu::Face::Back))],
         (true, false) => vec![raster(None)],

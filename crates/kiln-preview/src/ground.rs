@@ -75,8 +75,8 @@ impl Floor {
 }
 
 impl GroundPainter {
-    /// Makes the pipelines.
-    pub fn new(gpu: &Gpu) -> Self {
+    /// Makes the pipelines, for so many samples a pixel.
+    pub fn new(gpu: &Gpu, sample_count: u32) -> Self {
         let module = gpu.device.create_shader_module(wgpu::include_wgsl!("ground.wgsl"));
         let multiply = wgpu::BlendComponent {
             src_factor: wgpu::BlendFactor::Zero,
@@ -92,7 +92,7 @@ impl GroundPainter {
         let over = wgpu::BlendState { alpha: keep, ..wgpu::BlendState::ALPHA_BLENDING };
         let darken = wgpu::BlendState { color: multiply, alpha: keep };
         let above = Some(wgpu::Face::Back);
-        let grid = overlay_pipeline(gpu, &module, "fs_grid", Some(over), None);
+        let grid = overlay_pipeline(gpu, &module, "fs_grid", sample_count, Some(over), None);
         let block = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("ground"),
             size: size_of::<Block>() as u64,
@@ -104,7 +104,7 @@ impl GroundPainter {
             layout: &grid.get_bind_group_layout(0),
             entries: &[wgpu::BindGroupEntry { binding: 0, resource: block.as_entire_binding() }],
         });
-        let shadow = overlay_pipeline(gpu, &module, "fs_shadow", Some(darken), above);
+        let shadow = overlay_pipeline(gpu, &module, "fs_shadow", sample_count, Some(darken), above);
         GroundPainter { grid, grid_group, shadow, block }
     }
 

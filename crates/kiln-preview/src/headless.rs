@@ -92,6 +92,11 @@ impl HeadlessViewer {
         self.renderer.size()
     }
 
+    /// Draws with one sample a pixel from now on, as the window does while slow pictures move; edges are jagged then.
+    pub fn draw_single_samples(&mut self) {
+        self.renderer.resize_sampled(self.renderer.size(), 1);
+    }
+
     /// Draws a frame and waits until the device is done with it.
     ///
     /// # Errors
@@ -107,6 +112,14 @@ impl HeadlessViewer {
     /// [`GpuError::Readback`] when the device is lost.
     pub fn render(&mut self) -> Result<RgbaImage, GpuError> {
         self.renderer.render(&self.view);
+        self.picture()
+    }
+
+    /// Reads the last frame: sRGB-encoded, black before the first.
+    ///
+    /// # Errors
+    /// [`GpuError::Readback`] when the device is lost.
+    pub fn picture(&self) -> Result<RgbaImage, GpuError> {
         let output = self.renderer.output();
         let (width, height) = (output.width(), output.height());
         let bytes = self.gpu.read_texture(output, 0)?;
@@ -114,12 +127,20 @@ impl HeadlessViewer {
         RgbaImage::from_raw(width, height, bytes).ok_or_else(truncated)
     }
 
-    /// Draws a frame and reads its radiance, before exposure and tone mapping: linear Rec. 709, alpha left out.
+    /// Draws a frame and reads its radiance as [`HeadlessViewer::radiance`] does.
     ///
     /// # Errors
     /// [`GpuError::Readback`] when the device is lost.
     pub fn render_radiance(&mut self) -> Result<Image, GpuError> {
         self.renderer.render(&self.view);
+        self.radiance()
+    }
+
+    /// Reads the last frame's radiance, before exposure and tone mapping: linear Rec. 709, alpha left out.
+    ///
+    /// # Errors
+    /// [`GpuError::Readback`] when the device is lost.
+    pub fn radiance(&self) -> Result<Image, GpuError> {
         read_radiance(&self.gpu, self.renderer.radiance())
     }
 

@@ -141,7 +141,7 @@ impl LivePicture {
         self.pictures[A].take_frame_ms();
         let shown = &mut self.pictures[B];
         findings.frame_ms = shown.take_frame_ms().or(findings.frame_ms);
-        findings.scale = shown.moving_scale() as f32;
+        findings.moving = Some(shown.moving_quality());
         let inspector = shown.renderer.inspector();
         if let Some(times) = inspector.take_pass_times(Duration::ZERO) {
             findings.pass_times = times;

@@ -2,13 +2,15 @@
 
 use kiln_gpu::Gpu;
 
-use crate::program::{DEPTH_FORMAT, HDR_FORMAT, OUTPUT_FORMAT, SAMPLE_COUNT};
+use crate::program::{DEPTH_FORMAT, HDR_FORMAT, OUTPUT_FORMAT};
 
 /// The images a frame goes through.
 #[derive(Debug)]
 pub(crate) struct Picture {
     pub size: [u32; 2],
-    /// Linear radiance, several samples a pixel.
+    /// Samples a pixel.
+    pub sample_count: u32,
+    /// Linear radiance of each sample; `hdr` itself where a pixel has one.
     pub samples: wgpu::TextureView,
     /// Linear radiance.
     pub radiance: wgpu::Texture,
@@ -25,7 +27,7 @@ impl Picture {
     }
 
     /// Empty images of that size, limited so.
-    pub fn new(gpu: &Gpu, size: [u32; 2]) -> Self {
+    pub fn new(gpu: &Gpu, size: [u32; 2], sample_count: u32) -> Self {
         let size = Self::allowed_size(gpu, size);
         let attachment = wgpu::TextureUsages::RENDER_ATTACHMENT;
         let read = attachment | wgpu::TextureUsages::TEXTURE_BINDING;
@@ -44,12 +46,14 @@ impl Picture {
         let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
         let output = create("output", OUTPUT_FORMAT, 1, read | wgpu::TextureUsages::COPY_SRC);
         let radiance = create("hdr", HDR_FORMAT, 1, read | wgpu::TextureUsages::COPY_SRC);
+        let samples = (sample_count > 1).then(|| create("samples", HDR_FORMAT, sample_count, read));
         Picture {
             size,
-            samples: view(&create("samples", HDR_FORMAT, SAMPLE_COUNT, read)),
+            sample_count,
+            samples: view(samples.as_ref().unwrap_or(&radiance)),
             hdr: view(&radiance),
             radiance,
-            depth: view(&create("depth", DEPTH_FORMAT, SAMPLE_COUNT, read)),
+            depth: view(&create("depth", DEPTH_FORMAT, sample_count, read)),
             output_view: view(&output),
             output,
         }

@@ -38,11 +38,14 @@ pub(crate) struct Raster {
     pub cull: Option<wgpu::Face>,
     pub front_face: wgpu::FrontFace,
     pub blend: bool,
+    /// Samples a pixel.
+    pub sample_count: u32,
 }
 
 impl Raster {
     /// For the triangle that covers the screen.
-    pub const FULL_SCREEN: Raster = Raster { cull: None, front_face: wgpu::FrontFace::Ccw, blend: false };
+    pub const FULL_SCREEN: Raster =
+        Raster { cull: None, front_face: wgpu::FrontFace::Ccw, blend: false, sample_count: SAMPLE_COUNT };
 
     /// The one that a shader of this role is most likely drawn with.
     pub fn of_role(role: Role) -> Self {
@@ -267,7 +270,7 @@ impl Program {
             },
             depth_stencil: (!is_tonemap).then(|| self.depth_state(raster)),
             multisample: wgpu::MultisampleState {
-                count: if is_tonemap { 1 } else { SAMPLE_COUNT },
+                count: if is_tonemap { 1 } else { raster.sample_count },
                 ..Default::default()
             },
             fragment: Some(wgpu::FragmentState {

@@ -16,7 +16,7 @@ use crate::inspector::{Inspector, LastFrame};
 use crate::picture::Picture;
 use crate::pose::Pose;
 use crate::prepare::Prepared;
-use crate::program::{Program, Raster};
+use crate::program::{Program, Raster, SAMPLE_COUNT};
 use crate::scene_color::{Downsampler, SceneColor};
 use crate::scene_gpu::GpuScene;
 use crate::shadow::{Contents, Frustum, ShadowMap, ShadowReader};
@@ -37,13 +37,16 @@ pub(crate) struct Renderer {
     /// Made for the first program that reads the sun.
     shadow_reader: OnceCell<ShadowReader>,
     /// Made for the first view with another background than the environment.
-    backdrop: OnceCell<Backdrop>,
+    backdrop: BySamples<Backdrop>,
     /// Made for the first view with a floor.
-    ground: OnceCell<GroundPainter>,
+    ground: BySamples<GroundPainter>,
     inspector: Inspector,
     /// Whether probes may ask for the depth of frames.
     pub keeps_depth: bool,
 }
+
+/// What passes of several samples a pixel are drawn with, and those of one.
+type BySamples<T> = [OnceCell<T>; 2];
 
 /// What is shown, bound to the picture.
 #[derive(Debug)]
@@ -98,15 +101,15 @@ struct Look<'a> {
 impl Renderer {
     /// A renderer that shows nothing yet. `size` is width and height in pixels.
     pub fn new(gpu: &Gpu, size: [u32; 2]) -> Self {
-        let picture = Picture::new(gpu, size);
+        let picture = Picture::new(gpu, size, SAMPLE_COUNT);
         Renderer {
             gpu: gpu.clone(),
             picture,
             shown: None,
             downsampler: OnceCell::new(),
             shadow_reader: OnceCell::new(),
-            backdrop: OnceCell::new(),
-            ground: OnceCell::new(),
+            backdrop: BySamples::default(),
+            ground: BySamples::default(),
             inspector: Inspector::new(gpu),
             keeps_depth: false,
         }
@@ -114,11 +117,16 @@ impl Renderer {
 
     /// Changes the picture's size, limited to what the device takes; true if it changed.
     pub fn resize(&mut self, size: [u32; 2]) -> bool {
+        self.resize_sampled(size, self.picture.sample_count)
+    }
+
+    /// The same with so many samples a pixel: 1 or [`SAMPLE_COUNT`].
+    pub fn resize_sampled(&mut self, size: [u32; 2], sample_count: u32) -> bool {
         let size = Picture::allowed_size(&self.gpu, size);
-        if size == self.picture.size {
+        if (size, sample_count) == (self.picture.size, self.picture.sample_count) {
             return false;
         }
-        self.picture = Picture::new(&self.gpu, size);
+        self.picture = Picture::new(&self.gpu, size, sample_count);
         if let Some(shown) = self.shown.take() {
             self.show(shown.prepared);
         }
@@ -242,7 +250,8 @@ impl Renderer {
         self.inspector.end(&mut encoder);
         let mut submission = self.gpu.queue.submit([encoder.finish()]);
         self.inspector.submitted();
-        if let Some(limit) = view.fault_limit {
+        // Faults are those of samples.
+        if let Some(limit) = view.fault_limit.filter(|_| self.picture.sample_count == SAMPLE_COUNT) {
             submission = self.mark_faults(shown, limit, eye).unwrap_or(submission);
         }
         let world_from_clip = values.clip_from_world.inverse();
@@ -299,6 +308,9 @@ impl Renderer {
             keeps_samples: true,
         };
         self.draw_scene(encoder, shown, &look, Stage::Opaque, Some(scene_color.base()), eye);
+        if self.picture.sample_count == 1 {
+            scene_color.copy_base(encoder, &self.picture.radiance);
+        }
         downsampler.run(encoder, scene_color, self.inspector.timer.as_ref());
     }
 
@@ -331,16 +343,21 @@ impl Renderer {
     /// What the view has behind the scene, its values written.
     fn behind(&self, shown: &Shown, values: &FrameValues, view: &View) -> Behind<'_> {
         let backdrop = (view.background != Background::Environment)
-            .then(|| self.backdrop.get_or_init(|| Backdrop::new(&self.gpu)));
+            .then(|| self.by_samples(&self.backdrop, Backdrop::new));
         if let Some(backdrop) = backdrop {
             backdrop.write(&self.gpu, view);
         }
         let ground = shown.floor(view).map(|floor| {
-            let painter = self.ground.get_or_init(|| GroundPainter::new(&self.gpu));
+            let painter = self.by_samples(&self.ground, GroundPainter::new);
             painter.write(&self.gpu, floor, values, view.background);
             (painter, view.ground)
         });
         Behind { backdrop, ground }
+    }
+
+    fn by_samples<'a, T>(&self, made: &'a BySamples<T>, make: impl FnOnce(&Gpu, u32) -> T) -> &'a T {
+        let sample_count = self.picture.sample_count;
+        made[usize::from(sample_count == 1)].get_or_init(|| make(&self.gpu, sample_count))
     }
 
     /// The sun, and the light that falls on the scene.
@@ -371,7 +388,7 @@ impl Renderer {
         }
         let values = frustum.values(values);
         shadow.frames.iter().for_each(|frame| frame.write(&self.gpu, &values, &view.parameters));
-        let mut pass = shadow.begin(encoder);
+        let mut pass = shadow.begin(encoder, self.inspector.timed("sun shadow"));
         for item in shown.prepared.draws.opaque.iter().filter(|item| pose.draws[item.draw].visible) {
             if let Some(pipeline) = &item.shadow_pipeline {
                 pass.set_pipeline(pipeline);
@@ -389,6 +406,8 @@ impl Renderer {
         resolved: Option<&wgpu::TextureView>,
         eye: Vec3,
     ) {
+        // Samples are the picture then.
+        let is_single = self.picture.sample_count == 1;
         let store_if = |is_kept| if is_kept { wgpu::StoreOp::Store } else { wgpu::StoreOp::Discard };
         let color_load =
             if stage == Stage::Rest { wgpu::LoadOp::Load } else { wgpu::LoadOp::Clear(look.empty) };
@@ -398,8 +417,8 @@ impl Renderer {
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
                 view: &self.picture.samples,
                 depth_slice: None,
-                resolve_target: resolved,
-                ops: wgpu::Operations { load: color_load, store: store_if(look.keeps_samples) },
+                resolve_target: resolved.filter(|_| !is_single),
+                ops: wgpu::Operations { load: color_load, store: store_if(look.keeps_samples || is_single) },
             })],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                 view: &self.picture.depth,
@@ -438,12 +457,17 @@ impl Renderer {
         if let Some(backdrop) = behind.backdrop {
             return backdrop.draw(pass);
         }
-        let (Some((pipeline, _)), Some(frame)) = (&shown.prepared.background, &shown.background) else {
+        let (Some((pipeline, program)), Some(frame)) = (&shown.prepared.background, &shown.background) else {
             return;
         };
         let [width, height] = self.picture.size.map(|pixels| pixels as f32);
         pass.set_viewport(0.0, 0.0, width, height, 1.0, 1.0);
-        pass.set_pipeline(pipeline);
+        if self.picture.sample_count == SAMPLE_COUNT {
+            pass.set_pipeline(pipeline);
+        } else {
+            let raster = Raster { sample_count: self.picture.sample_count, ..Raster::FULL_SCREEN };
+            pass.set_pipeline(&program.pipeline(&self.gpu.device, raster));
+        }
         frame.set(pass);
         pass.draw(0..3, 0..1);
         pass.set_viewport(0.0, 0.0, width, height, 0.0, 1.0);
@@ -478,11 +502,13 @@ impl Renderer {
         mirrored: bool,
     ) {
         let blend = item.raster.blend && look.blends;
-        let raster = Raster { front_face: front_face(mirrored), blend, ..item.raster };
+        let sample_count = self.picture.sample_count;
+        let raster = Raster { front_face: front_face(mirrored), blend, sample_count, ..item.raster };
         if raster == item.raster {
             pass.set_pipeline(&item.pipeline);
         } else {
-            // Made when an animation first turns the draw inside out, or a channel first shows what is blended.
+            // Made when an animation first turns the draw inside out, a channel first shows what is blended, or a moving picture
+            // first has one sample a pixel.
             let program = &look.draws.programs[item.program].program;
             pass.set_pipeline(&program.pipeline(&self.gpu.device, raster));
         }

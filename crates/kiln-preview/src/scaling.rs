@@ -1,6 +1,11 @@
-//! How large moving frames are drawn: as large as keeps them fluent, and whole again when nothing moves.
+//! How well moving frames are drawn: as well as keeps them fluent, and whole again when nothing moves.
+//!
+//! The samples of a pixel go first: on a CPU each small triangle that touches one of them costs a block of pixels, so
+//! that one sample for each pixel takes a third to a fifth of the time (`cargo xtask bench render`).
 
 use std::time::{Duration, Instant};
+
+use crate::program::SAMPLE_COUNT;
 
 /// What a moving frame may take.
 const FRAME_MS: f64 = 33.0;
@@ -11,30 +16,47 @@ const STEP: f64 = 0.125;
 /// Without a change for this long the picture is at rest.
 const REST: Duration = Duration::from_millis(180);
 
-/// Decides on the size of frames from how long those before took.
+/// What a frame is drawn with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct FrameQuality {
+    /// Share of the picture's width and height.
+    pub scale: f64,
+    /// Samples a pixel.
+    pub sample_count: u32,
+}
+
+impl FrameQuality {
+    /// Nothing is saved.
+    pub const WHOLE: FrameQuality = FrameQuality { scale: 1.0, sample_count: SAMPLE_COUNT };
+}
+
+/// Decides on the quality of frames from how long those before took.
 #[derive(Debug)]
 pub(crate) struct Scaling {
-    /// What a frame of the whole size takes, milliseconds; `None` before the first.
+    /// What a whole frame takes, milliseconds; `None` before the first.
     whole_ms: Option<f64>,
+    /// The same with one sample a pixel.
+    single_ms: Option<f64>,
     changed: Option<Instant>,
 }
 
 impl Scaling {
     /// Knows nothing yet.
     pub fn new() -> Self {
-        Scaling { whole_ms: None, changed: None }
+        Scaling { whole_ms: None, single_ms: None, changed: None }
     }
 
     /// Another scene or size: frames may take another time.
     pub fn forget(&mut self) {
-        self.whole_ms = None;
+        (self.whole_ms, self.single_ms) = (None, None);
     }
 
-    /// A frame of this scale took so long.
-    pub fn note(&mut self, scale: f64, ms: f64) {
-        let whole_ms = ms / (scale * scale);
+    /// A frame of this quality took so long.
+    pub fn note(&mut self, quality: FrameQuality, ms: f64) {
+        let ms = ms / (quality.scale * quality.scale);
+        let noted = if quality.sample_count == 1 { &mut self.single_ms } else { &mut self.whole_ms };
         // Of two frames in a row, so that one that was held up decides little.
-        self.whole_ms = Some(self.whole_ms.map_or(whole_ms, |before| (before * whole_ms).sqrt()));
+        *noted = Some(noted.map_or(ms, |before| (before * ms).sqrt()));
     }
 
     /// Something that is seen changed at this time.
@@ -47,17 +69,20 @@ impl Scaling {
         REST.checked_sub(now.saturating_duration_since(self.changed?)).filter(|left| !left.is_zero())
     }
 
-    /// The share of the picture's width and height to draw now.
-    pub fn scale(&self, now: Instant) -> f64 {
-        match (self.rest_in(now), self.whole_ms) {
-            (Some(_), Some(whole_ms)) => moving_scale(whole_ms),
-            _ => 1.0,
-        }
+    /// What to draw with now.
+    pub fn quality(&self, now: Instant) -> FrameQuality {
+        if self.rest_in(now).is_some() { self.moving_quality() } else { FrameQuality::WHOLE }
     }
 
-    /// The share that moving frames have.
-    pub fn moving_scale(&self) -> f64 {
-        self.whole_ms.map_or(1.0, moving_scale)
+    /// What moving frames are drawn with.
+    pub fn moving_quality(&self) -> FrameQuality {
+        match self.whole_ms {
+            Some(whole_ms) if moving_scale(whole_ms) < 1.0 => {
+                let scale = moving_scale(self.single_ms.unwrap_or(whole_ms));
+                FrameQuality { scale, sample_count: 1 }
+            }
+            _ => FrameQuality::WHOLE,
+        }
     }
 }
 

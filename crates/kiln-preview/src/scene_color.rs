@@ -102,7 +102,9 @@ impl SceneColor {
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
             format: HDR_FORMAT,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT
+                | wgpu::TextureUsages::TEXTURE_BINDING
+                | wgpu::TextureUsages::COPY_DST,
             view_formats: &[],
         });
         let level = |level| {
@@ -132,6 +134,12 @@ impl SceneColor {
         };
         let sources = levels[..levels.len() - 1].iter().map(source).collect();
         SceneColor { view: texture.create_view(&wgpu::TextureViewDescriptor::default()), levels, sources }
+    }
+
+    /// Fills the largest level with a picture of the same size.
+    pub fn copy_base(&self, encoder: &mut wgpu::CommandEncoder, picture: &wgpu::Texture) {
+        let base = self.view.texture();
+        encoder.copy_texture_to_texture(picture.as_image_copy(), base.as_image_copy(), picture.size());
     }
 
     /// The largest level.

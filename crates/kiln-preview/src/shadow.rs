@@ -107,7 +107,11 @@ impl ShadowMap {
     }
 
     /// Begins the pass that fills the map.
-    pub fn begin<'a>(&self, encoder: &'a mut wgpu::CommandEncoder) -> wgpu::RenderPass<'a> {
+    pub fn begin<'a>(
+        &self,
+        encoder: &'a mut wgpu::CommandEncoder,
+        timestamp_writes: Option<wgpu::RenderPassTimestampWrites<'a>>,
+    ) -> wgpu::RenderPass<'a> {
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("sun shadow"),
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
@@ -118,6 +122,7 @@ impl ShadowMap {
                 }),
                 stencil_ops: None,
             }),
+            timestamp_writes,
             ..Default::default()
         })
     }

@@ -10,14 +10,15 @@ use kiln_gpu::Gpu;
 
 use crate::prepare::Prepared;
 use crate::renderer::Renderer;
-use crate::scaling::Scaling;
+use crate::scaling::{FrameQuality, Scaling};
 use crate::view::View;
 
 /// Soon after a frame is done somebody has to look.
 const FRAME_ASK_INTERVAL: Duration = Duration::from_millis(2);
 
 /// Draws only when what it shows or how it is seen has changed, and no earlier than the frame before is done: a queue of
-/// frames would only make them late. While things move the picture may have fewer pixels than its place.
+/// frames would only make them late. While things move a pixel may have fewer samples and the picture fewer
+/// pixels than its place.
 pub(crate) struct SidePicture {
     gpu: Gpu,
     pub renderer: Renderer,
@@ -29,10 +30,10 @@ pub(crate) struct SidePicture {
     scaling: Scaling,
     /// Width and height of the place, in pixels.
     size: [u32; 2],
-    /// Share of it that the last frame has.
-    scale: f64,
-    /// How long the frame took that was submitted with this scale, when it is done.
-    in_flight: Option<(f64, Receiver<f64>)>,
+    /// What the last frame was drawn with.
+    quality: FrameQuality,
+    /// How long the frame took that was submitted with this quality, when it is done.
+    in_flight: Option<(FrameQuality, Receiver<f64>)>,
 }
 
 impl SidePicture {
@@ -47,7 +48,7 @@ impl SidePicture {
             frame: 0,
             scaling: Scaling::new(),
             size: [1, 1],
-            scale: 1.0,
+            quality: FrameQuality::WHOLE,
             in_flight: None,
         }
     }
@@ -66,7 +67,8 @@ impl SidePicture {
     fn register(&mut self, render_state: &RenderState) -> TextureId {
         let mut egui_renderer = render_state.renderer.write();
         // One texel a pixel: nothing to filter.
-        let filter = if self.is_whole() { wgpu::FilterMode::Nearest } else { wgpu::FilterMode::Linear };
+        let filter =
+            if self.quality.scale >= 1.0 { wgpu::FilterMode::Nearest } else { wgpu::FilterMode::Linear };
         let (device, view) = (&self.gpu.device, self.renderer.output_view());
         if let Some(id) = self.texture {
             egui_renderer.update_egui_texture_from_wgpu_texture(device, view, filter, id);
@@ -90,8 +92,13 @@ impl SidePicture {
         if is_new && self.drawn.is_some() {
             self.scaling.change(now);
         }
-        let scale = self.scaling.scale(now);
-        let is_coarse = !self.is_whole() && scale >= 1.0;
+        let mut quality = self.scaling.quality(now);
+        if view.fault_limit.is_some() {
+            // A fault is one of a sample.
+            quality.sample_count = FrameQuality::WHOLE.sample_count;
+        }
+        let FrameQuality { scale, sample_count } = quality;
+        let is_coarse = !self.is_whole() && quality == FrameQuality::WHOLE;
         if let Some(left) = self.scaling.rest_in(now) {
             context.request_repaint_after(left);
         }
@@ -102,10 +109,10 @@ impl SidePicture {
         if !is_new && !is_coarse {
             return false;
         }
-        let is_other_scale = (scale >= 1.0) != self.is_whole();
+        let is_other_filter = (scale >= 1.0) != (self.quality.scale >= 1.0);
         let size = self.size.map(|pixels| ((f64::from(pixels) * scale).round() as u32).max(1));
-        (self.scale, self.drawn) = (scale, Some(view.clone()));
-        if self.renderer.resize(size) || is_other_scale {
+        (self.quality, self.drawn) = (quality, Some(view.clone()));
+        if self.renderer.resize_sampled(size, sample_count) || is_other_filter {
             self.register(render_state);
         }
         let begun = Instant::now();
@@ -118,14 +125,14 @@ impl SidePicture {
             // A receiver that is gone belongs to a window that is gone.
             let _ = sender.send(begun.elapsed().as_secs_f64() * 1e3);
         });
-        self.in_flight = Some((scale, done));
+        self.in_flight = Some((quality, done));
         context.request_repaint_after(FRAME_ASK_INTERVAL);
         true
     }
 
     /// How long the last frame took, once, when it is done.
     pub fn take_frame_ms(&mut self) -> Option<f64> {
-        let (scale, done) = self.in_flight.as_ref()?;
+        let (quality, done) = self.in_flight.as_ref()?;
         match done.try_recv() {
             Err(TryRecvError::Empty) => None,
             Err(TryRecvError::Disconnected) => {
@@ -133,21 +140,21 @@ impl SidePicture {
                 None
             }
             Ok(ms) => {
-                self.scaling.note(*scale, ms);
+                self.scaling.note(*quality, ms);
                 self.in_flight = None;
                 Some(ms)
             }
         }
     }
 
-    /// Whether the last frame has a texel for each pixel of its place.
+    /// Whether the last frame has all samples for each pixel of its place.
     pub fn is_whole(&self) -> bool {
-        self.scale >= 1.0
+        self.quality == FrameQuality::WHOLE
     }
 
-    /// Share of the picture's width that moving frames have.
-    pub fn moving_scale(&self) -> f64 {
-        self.scaling.moving_scale()
+    /// What moving frames are drawn with.
+    pub fn moving_quality(&self) -> FrameQuality {
+        self.scaling.moving_quality()
     }
 
     /// Another picture has posed what both draw.

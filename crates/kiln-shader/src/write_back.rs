@@ -1,7 +1,7 @@
 //! Writes a parameter's value where its shader says the first one, and leaves every other byte as it is.
 //!
 //! That is in the annotation (`@slider(0, 1, 0.25)`), else in the declaration's literals (`= 16u`), else the annotation gets
-//! a number more.
+//! a number more. Where annotation and literals say the same they go on doing so: other tools read the literals alone.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -199,7 +199,6 @@ fn replacements(
     let FirstPlace { arguments, literals, end, .. } = &annotation.place;
     let is_argument = !arguments.is_empty();
     let places = if is_argument { arguments } else { literals };
-    let spelling = |old, number| Spelling { old, shape, is_code: !is_argument, annotation }.of(number);
     let is_one = value.iter().all(|number| *number == value[0]);
     let short = if is_one { &value[..1] } else { value };
     let (Some(first), Some(last)) = (places.first(), places.last()) else {
@@ -208,6 +207,7 @@ fn replacements(
         return end.map(|end| vec![(end..end, format!(", {}", numbers.join(", ")))]);
     };
     let old = |place: &Range<usize>| text.get(place.clone());
+    let spelling = |old, number| Spelling { old, shape, is_code: !is_argument, annotation }.of(number);
     let numbers = if places.len() == value.len() { value } else { short };
     if places.len() != numbers.len() {
         // Another number of numbers: the list is written anew.
@@ -222,7 +222,34 @@ fn replacements(
             replaced.push((place.clone(), spelling(old(place)?, *number)));
         }
     }
+    if is_argument && says_the_same(text, annotation, shape) {
+        let numbers = if literals.len() == value.len() { value } else { short };
+        let changed = literals.iter().zip(numbers).zip(&annotation.default);
+        let changed = changed.filter(|((_, number), before)| shape.rounded(**before) != Some(**number));
+        for ((place, number), _) in changed.filter(|_| literals.len() == numbers.len()) {
+            let spelling = Spelling { old: old(place)?, shape, is_code: true, annotation };
+            replaced.push((place.clone(), spelling.of(*number)));
+        }
+        replaced.sort_by_key(|(place, _)| place.start);
+    }
     Some(replaced)
+}
+
+/// Whether the declaration's literals are the annotation's first value.
+fn says_the_same(text: &str, annotation: &Annotation, shape: Shape) -> bool {
+    let FirstPlace { arguments, literals, .. } = &annotation.place;
+    let number = |place: &Range<usize>| match text.get(place.clone())? {
+        "true" => Some(1.0),
+        "false" => Some(0.0),
+        digits => digits.trim_end_matches(['f', 'F', 'u', 'U', 'i']).parse().ok(),
+    };
+    let is_same = |(place, first): (&Range<usize>, &f64)| {
+        number(place).and_then(|number| shape.rounded(number)) == shape.rounded(*first)
+    };
+    !literals.is_empty()
+        && literals.len() == arguments.len()
+        && literals.len() == annotation.default.len()
+        && literals.iter().zip(&annotation.default).all(is_same)
 }
 
 /// How a number is written in place of another.

@@ -23,6 +23,14 @@ const SCENES: [(&str, &str); 5] = [
 
 const PANORAMA: &str = "hdr/polyhaven-pmndrs/studio.hdr";
 
+/// A frame at rest.
+const WHOLE: [&str; 2] = ["--size", "1280x720"];
+/// What a window of that size draws with while a slow picture moves.
+const MOVING: [(&str, [&str; 3]); 2] = [
+    ("moving, one sample a pixel", ["--single-sample", "--size", "1280x720"]),
+    ("moving, a quarter of its width", ["--single-sample", "--size", "320x180"]),
+];
+
 /// Prints a table for each scene.
 pub(crate) fn run(frames: usize) -> Result<(), String> {
     let corpus = std::env::var_os("KILN_CORPUS").ok_or("KILN_CORPUS must name the folder of real files")?;
@@ -39,13 +47,21 @@ pub(crate) fn run(frames: usize) -> Result<(), String> {
         let below = file.strip_prefix(Path::new(&corpus)).unwrap_or(&file).display().to_string();
         write_project(&project, &below, None)?;
         let effects = effects(&bench, &project)?;
-        let whole = frame_ms(&bench, &project, frames, "1280x720", &mut adapter)?;
+        let whole = frame_ms(&bench, &project, frames, &WHOLE, &mut adapter)?;
         println!("\n{name}, 1280x720, studio: {:.1} ms a frame (best {:.1})", whole.median, whole.best);
         for (pass, ms) in &whole.passes {
             println!("  pass {pass:<25} {ms:>7.1} ms");
         }
+        for (what, options) in MOVING {
+            let moving = frame_ms(&bench, &project, frames, &options, &mut adapter)?;
+            println!(
+                "  {what:<30} {:>7.1} ms   {:.1} times as fast",
+                moving.median,
+                whole.median / moving.median
+            );
+        }
         if !is_software(&adapter) {
-            let hd = frame_ms(&bench, &project, frames, "1920x1080", &mut adapter)?;
+            let hd = frame_ms(&bench, &project, frames, &["--size", "1920x1080"], &mut adapter)?;
             let shading = hd.passes.iter().filter(|(pass, _)| SHADING.contains(&pass.as_str()));
             let shading: f64 = shading.map(|(_, ms)| ms).sum();
             let verdict = if shading <= BUDGET_MS { "within" } else { "OVER" };
@@ -53,7 +69,7 @@ pub(crate) fn run(frames: usize) -> Result<(), String> {
         }
         for effect in effects {
             write_project(&project, &below, Some(&effect))?;
-            let without = frame_ms(&bench, &project, frames, "1280x720", &mut adapter)?;
+            let without = frame_ms(&bench, &project, frames, &WHOLE, &mut adapter)?;
             println!(
                 "  without {effect:<22} {:>7.1} ms   it costs {:>6.1} ms",
                 without.median,
@@ -129,11 +145,11 @@ fn frame_ms(
     bench: &Bench,
     project: &Path,
     frames: usize,
-    size: &str,
+    options: &[&str],
     adapter: &mut String,
 ) -> Result<Times, String> {
     let mut command = bench.kiln("cache");
-    command.args(["render", "--json", "--size", size, "--frames", &(frames + 1).to_string(), "--out"]);
+    command.args(["render", "--json", "--frames", &(frames + 1).to_string()]).args(options).arg("--out");
     let report = output_of(command.arg(bench.folder.join("frames")).arg(project))?;
     let value = |line: &str, key: &str| {
         let rest = line.trim().strip_prefix(&format!("\"{key}\": "))?;

@@ -9,6 +9,7 @@ use crate::faults::FaultCounts;
 use crate::inspect::InspectionState;
 use crate::pass_timer::PassTime;
 use crate::probe::PixelProbe;
+use crate::scaling::FrameQuality;
 use crate::theme;
 
 /// Where marks begin: no 16-bit float is larger.
@@ -24,8 +25,8 @@ pub(crate) struct Findings {
     pub pass_times: Vec<PassTime>,
     /// From one frame to the next while the picture changes.
     pub frame_ms: Option<f64>,
-    /// Share of the picture's width that moving frames are drawn at.
-    pub scale: f32,
+    /// What moving frames are drawn with; `None` before the first.
+    pub moving: Option<FrameQuality>,
 }
 
 pub(super) fn show(ui: &mut Ui, state: &mut PanelState) {
@@ -192,8 +193,8 @@ pub(super) fn show_times(ui: &mut Ui, findings: &Findings) {
         if let Some(frame_ms) = findings.frame_ms {
             line("whole frame", format!("{frame_ms:.1} ms"));
         }
-        if findings.scale > 0.0 && findings.scale < 1.0 {
-            line("while it moves", format!("{:.0} % of the size", findings.scale * 100.0));
+        if let Some(moving) = findings.moving.filter(|moving| *moving != FrameQuality::WHOLE) {
+            line("while it moves", format!("{:.0} % of the size, one sample a pixel", moving.scale * 100.0));
         }
     });
 }

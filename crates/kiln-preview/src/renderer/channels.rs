@@ -7,6 +7,7 @@ use super::{Behind, Look, Renderer, Shown, Stage};
 use crate::channel::{Channel, FAULTS_CODE};
 use crate::inspector::Inspector;
 use crate::probe::PendingProbe;
+use crate::program::SAMPLE_COUNT;
 use crate::uniform::InspectValues;
 
 impl Renderer {
@@ -78,7 +79,9 @@ impl Renderer {
     /// Asks about a pixel of the last frame; `None` if it lies outside, or if its depth was not kept.
     pub fn probe(&self, pixel: [u32; 2]) -> Option<PendingProbe> {
         let is_within = (0..2).all(|axis| pixel[axis] < self.picture.size[axis]);
-        (is_within && self.keeps_depth).then(|| self.inspector.ask(&self.gpu, &self.picture, pixel))?
+        let has_samples = self.picture.sample_count == SAMPLE_COUNT;
+        (is_within && has_samples && self.keeps_depth)
+            .then(|| self.inspector.ask(&self.gpu, &self.picture, pixel))?
     }
 }
 

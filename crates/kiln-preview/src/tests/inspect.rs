@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use super::fixture::{Build, SIX_COLORS, Sphere, gpu};
 use super::frames::FRONT;
 use crate::channel::{Channel, FAULTS_CODE};
-use crate::scaling::Scaling;
+use crate::scaling::{FrameQuality, Scaling};
 use crate::{Encoding, FaultCounts, HeadlessViewer, InspectionState, PixelProbe, Selection, View};
 
 const SIZE: [u32; 2] = [160, 90];
@@ -332,28 +332,35 @@ fn every_encoding_has_a_channel() {
 }
 
 #[test]
-fn moving_frames_shrink_as_far_as_they_are_slow_and_grow_whole_at_rest() {
+fn moving_frames_save_samples_then_pixels_as_far_as_they_are_slow_and_grow_whole_at_rest() {
     use std::time::{Duration, Instant};
+    let whole = FrameQuality::WHOLE;
+    let single = |scale| FrameQuality { scale, sample_count: 1 };
     let begin = Instant::now();
     let mut scaling = Scaling::new();
     scaling.change(begin);
-    assert_eq!(scaling.scale(begin), 1.0, "nothing is known yet");
-    scaling.note(1.0, 10.0);
-    assert_eq!(scaling.scale(begin), 1.0, "frames are fast enough");
+    assert_eq!(scaling.quality(begin), whole, "nothing is known yet");
+    scaling.note(whole, 10.0);
+    assert_eq!(scaling.quality(begin), whole, "frames are fast enough");
     let mut scaling = Scaling::new();
-    scaling.note(1.0, 132.0);
-    assert_eq!(scaling.scale(begin), 1.0, "nothing moves");
+    scaling.note(whole, 132.0);
+    assert_eq!(scaling.quality(begin), whole, "nothing moves");
     scaling.change(begin);
-    assert_eq!(scaling.scale(begin), 0.5, "a quarter of the pixels takes a quarter of the time");
-    scaling.note(0.5, 33.0);
-    assert_eq!(scaling.scale(begin), 0.5, "which is what it takes");
+    assert_eq!(scaling.quality(begin), single(0.5), "a quarter of the pixels takes a quarter of the time");
+    scaling.note(single(0.5), 33.0);
+    assert_eq!(scaling.quality(begin), single(0.5), "which is what it takes");
+    for _ in 0..20 {
+        scaling.note(single(0.5), 8.0);
+    }
+    assert_eq!(scaling.quality(begin), single(1.0), "one sample a pixel is fast enough");
     let rest = begin + scaling.rest_in(begin).expect("it moves");
-    assert_eq!((scaling.scale(rest), scaling.rest_in(rest)), (1.0, None));
-    scaling.note(0.5, 1e6);
-    scaling.note(0.5, 1e6);
-    assert_eq!(scaling.scale(begin), 0.25, "a picture must be left");
+    assert_eq!((scaling.quality(rest), scaling.rest_in(rest)), (whole, None));
+    for _ in 0..20 {
+        scaling.note(single(0.5), 1e6);
+    }
+    assert_eq!(scaling.quality(begin), single(0.25), "a picture must be left");
     scaling.forget();
-    assert_eq!(scaling.scale(begin + Duration::from_millis(1)), 1.0);
+    assert_eq!(scaling.quality(begin + Duration::from_millis(1)), whole);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use super::effects::picture;
 use super::fixture::{Build, SIX_COLORS, Sphere, gpu};
 use super::frames::STEPS_MAX;
-use crate::HeadlessViewer;
+use crate::{Background, Ground, HeadlessViewer};
 
 /// Glass of this index that reflects nothing.
 fn glass(transmission: f32, ior: f32, roughness: f32) -> Value {
@@ -116,4 +116,33 @@ fn scene_without_glass_draws_no_picture_for_it() {
     };
     assert_ne!(reads(glass(0.0, 1.5, 0.0)), Some(true));
     assert_ne!(reads(glass(1.0, 1.5, 0.0)), Some(false));
+}
+
+#[test]
+fn frame_of_one_sample_a_pixel_is_that_of_several_but_for_its_edges() {
+    let Some(gpu) = gpu() else { return };
+    let lamp = (lamp([1.0, 0.0, 0.0]), [0.0, 0.0, -3.0], 0.8);
+    let sphere = Sphere { material: glass(1.0, 1.5, 0.0), others: vec![lamp], ..Sphere::default() };
+    let mut build = Build::new();
+    let glb = sphere.glb();
+    build.env("six", SIX_COLORS).lut().shaders_of(&glb).scene("ball", "six", glb);
+    let mut viewer = HeadlessViewer::new(gpu.clone(), [320, 180]);
+    assert_eq!(viewer.apply(&build.revision()).diagnostics, vec![]);
+    for (background, ground) in [
+        (Background::Environment, Ground::default()),
+        (Background::Checker, Ground { has_grid: true, catches_shadow: true }),
+    ] {
+        (viewer.view.background, viewer.view.ground) = (background, ground);
+        let several = viewer.render().expect("the device reads back");
+        let mut single = HeadlessViewer::new(gpu.clone(), [320, 180]);
+        single.draw_single_samples();
+        single.apply(&build.revision());
+        single.view = viewer.view.clone();
+        let one = single.render().expect("the device reads back");
+        assert_eq!(gpu.take_errors(), Vec::<String>::new());
+        let differs = |(a, b): &(&Rgba<u8>, &Rgba<u8>)| (0..3).any(|at| a[at].abs_diff(b[at]) > STEPS_MAX);
+        let count = several.pixels().zip(one.pixels()).filter(differs).count();
+        // Rims of two spheres, seen and refracted, and the lines of a grid.
+        assert!((50..4000).contains(&count), "{background:?}: {count} pixels differ");
+    }
 }

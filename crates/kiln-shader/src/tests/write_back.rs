@@ -73,7 +73,7 @@ fn numbers_stand_where_the_author_wrote_them_and_as_he_did() {
     wgsl("gain", &[0.1], &[("-1.50f", "0.1f")]);
     wgsl("gain", &[3.0], &[("-1.50f", "3.0f")]);
     wgsl("plain", &[3.0], &[("2.0", "3.0")]);
-    wgsl("is_on", &[0.0], &[("true", "false")]);
+    wgsl("is_on", &[0.0], &[("true", "false"), ("true", "false")]);
     wgsl("tint", &[1.0, 0.7, 1.0], &[("0.5", "0.7"), ("0.25", "1.0")]);
     wgsl("wetness", &[0.333], &[("0.25", "0.333")]);
     wgsl("wetness", &[1.0], &[("0.25", "1.0")]);
@@ -87,6 +87,21 @@ fn numbers_stand_where_the_author_wrote_them_and_as_he_did() {
     glsl("wet", &[0.25], &[(".5f", "0.25f")]);
     glsl("is_lit", &[0.0], &[("true", "false")]);
     glsl("least", &[-8.0], &[("-3", "-8")]);
+}
+
+#[test]
+fn literal_that_says_what_its_annotation_does_changes_with_it() {
+    let text = |literal: &str, annotation: &str| {
+        format!(
+            "override mode: u32 = {literal}; // @choice({annotation}) how
+@fragment fn fs_main() -> @location(0) vec4f {{ return vec4f(f32(mode)); }}"
+        )
+    };
+    let both = text("0u", "0, neutral, agx, none");
+    check("a.wgsl", &both, "mode", &[2.0], &[("0u", "2u"), ("0", "2")]);
+    check("a.wgsl", &both, "mode", &[0.0], &[]);
+    // Its author meant two things.
+    check("a.wgsl", &text("1u", "0, neutral, agx, none"), "mode", &[2.0], &[("0", "2")]);
 }
 
 #[test]

@@ -43,6 +43,9 @@ pub(crate) struct RenderArgs {
     /// Picture size in pixels [default: 1280x720, or that of `--look`]
     #[arg(long, value_parser = parse_size)]
     pub(crate) size: Option<[u32; 2]>,
+    /// One sample a pixel, as the window draws while slow pictures move: fast, with jagged edges
+    #[arg(long, conflicts_with_all = ["probe", "mark_faults"])]
+    pub(crate) single_sample: bool,
     /// Number of frames of each
     #[arg(long, default_value_t = 1)]
     pub(crate) frames: usize,

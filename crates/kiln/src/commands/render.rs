@@ -139,6 +139,9 @@ impl<'a> Session<'a> {
         viewer.view.exposure_ev = args.exposure;
         (viewer.view.background, viewer.view.ground) = (args.background, args.ground);
         viewer.view.fault_limit = args.inspect.mark_faults;
+        if args.single_sample {
+            viewer.draw_single_samples();
+        }
         let offered = viewer.apply(revision);
         let diagnostics = revision.table.diagnostics.clone();
         Ok(Session { args, viewer, offered, drawn: vec![], shots: vec![], notes: vec![], diagnostics })
@@ -265,7 +268,7 @@ impl<'a> Session<'a> {
             Some(pixel) => Some(self.probe(pixel)?),
             None => None,
         };
-        let picture = self.viewer.render().context("reading a frame")?;
+        let picture = self.viewer.picture().context("reading a frame")?;
         let channel = self.viewer.view.channel;
         let shown = &applied.shown;
         let words = [shown.scene.as_deref(), shown.env.as_deref(), choice, channel.map(Channel::name)];
@@ -275,7 +278,7 @@ impl<'a> Session<'a> {
         let file = self.args.out.join(format!("{stem}.png"));
         picture.save(&file).with_context(|| format!("writing {}", file.display()))?;
         if self.args.exr {
-            let radiance = self.viewer.render_radiance().context("reading a frame")?;
+            let radiance = self.viewer.radiance().context("reading a frame")?;
             let bytes = kiln_image::exr_write::encode_image(&radiance, kiln_image::Cancel::NEVER)?;
             kiln_build::write_atomically(&kiln_build::Disk, &file.with_extension("exr"), &bytes)
                 .context("writing the radiance")?;
