@@ -59,15 +59,9 @@ pub fn analyse(
     cancel: Cancel,
 ) -> Result<Analysis, Cancelled> {
     let (width, height) = (panorama.width(), panorama.height());
-    let rgb = panorama.rgb();
-    let whole_row = |row: usize| Cow::Borrowed(&rgb[row * width * 3..][..width * 3]);
-    let whole = sums(width, height, whole_row, cancel)?;
-    let need = Need::new(request, whole.mean(), whole.variance(), cancel)?;
-    let bright = take_brightest(width, height, rgb, &whole, &need, cancel)?;
+    let Division { whole, bright, rest, band_limit } = divide(panorama, request, cancel)?;
     let by_row = BrightRows::new(width, &bright);
-    let dim_row = |row: usize| by_row.dim(row, whole_row(row));
-    let rest = if bright.is_empty() { whole.clone() } else { sums(width, height, dim_row, cancel)? };
-    let band_limit = need.band_limit(rest.variance());
+    let dim_row = |row: usize| by_row.dim(row, whole_row(panorama, row));
     let dim = kiln_sphere::analyse_rows(width, height, dim_row, band_limit, cancel)?;
     let mut low = dim.truncated(LOW_BAND_LIMIT);
     if !bright.is_empty() {
@@ -84,6 +78,58 @@ pub fn analyse(
         low,
         range: whole.range,
     })
+}
+
+/// What of a panorama is transformed, and what is not.
+struct Division {
+    whole: Sums,
+    bright: Vec<BrightTexel>,
+    /// The panorama without the bright texels' excess.
+    rest: Sums,
+    band_limit: usize,
+}
+
+fn divide(panorama: &Panorama, request: &AnalysisRequest, cancel: Cancel) -> Result<Division, Cancelled> {
+    let (width, height) = (panorama.width(), panorama.height());
+    let whole = sums(width, height, |row| whole_row(panorama, row), cancel)?;
+    let need = Need::new(request, whole.mean(), whole.variance(), cancel)?;
+    let bright = take_brightest(width, height, panorama.rgb(), &whole, &need, cancel)?;
+    let by_row = BrightRows::new(width, &bright);
+    let dim_row = |row: usize| by_row.dim(row, whole_row(panorama, row));
+    let rest = if bright.is_empty() { whole.clone() } else { sums(width, height, dim_row, cancel)? };
+    let band_limit = need.band_limit(rest.variance());
+    Ok(Division { whole, bright, rest, band_limit })
+}
+
+fn whole_row(panorama: &Panorama, row: usize) -> Cow<'_, [f32]> {
+    let width = panorama.width();
+    Cow::Borrowed(&panorama.rgb()[row * width * 3..][..width * 3])
+}
+
+/// What [`analyse`] will make of a panorama, known before its transform is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Forecast {
+    /// Highest degree.
+    pub band_limit: usize,
+    /// Texels that are convolved directly.
+    pub bright_texels: usize,
+    /// Standard deviation of what is transformed, relative to the mean radiance.
+    pub contrast: f64,
+}
+
+/// Looks at each texel once, and transforms nothing.
+///
+/// # Errors
+/// [`Cancelled`] within a row's work.
+pub fn forecast(
+    panorama: &Panorama,
+    request: &AnalysisRequest,
+    cancel: Cancel,
+) -> Result<Forecast, Cancelled> {
+    let Division { whole, bright, rest, band_limit } = divide(panorama, request, cancel)?;
+    let mean = square(whole.mean()).sqrt();
+    let contrast = if mean > 0.0 { rest.variance().sqrt() / mean } else { 0.0 };
+    Ok(Forecast { band_limit, bright_texels: bright.len(), contrast })
 }
 
 /// Bright texels by their rows: rows without and rows of nothing but their excess are made as they are read, since a

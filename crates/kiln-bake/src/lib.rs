@@ -22,6 +22,7 @@
 mod analysis;
 mod bright;
 mod bytes;
+pub mod cost;
 mod dering;
 mod encode;
 mod law;
@@ -43,7 +44,7 @@ mod tests;
 pub use kiln_brdf::{Masking, SheenVisibility, fit_error, fit_karis_mobile, fit_lazarov};
 pub use kiln_sphere::{Bulk, Cancel, Cancelled, Lobe};
 
-pub use analysis::{Analysis, AnalysisRequest, BAND_LIMIT_MAX, BRIGHT_MAX, analyse};
+pub use analysis::{Analysis, AnalysisRequest, BAND_LIMIT_MAX, BRIGHT_MAX, Forecast, analyse, forecast};
 pub use bytes::BakeError;
 pub use dering::{Deringed, dering};
 pub use encode::{EncodedLevel, TexelFormat, decode_level, encode_level, scale_log2};

@@ -192,7 +192,7 @@ pub(crate) fn error_share(face_size: usize) -> f64 {
 }
 
 /// The cheapest that is little beside the error asked for.
-fn interpolation(error: f64) -> Interpolation {
+pub(crate) fn interpolation(error: f64) -> Interpolation {
     if error >= 5e-4 { Interpolation::Coarse } else { Interpolation::Fine }
 }
 

@@ -174,6 +174,29 @@ fn run_plan(engine: &Engine, plan: &Plan, options: &RunOptions) -> Result<Ran, E
 }
 
 impl Built {
+    /// About how long the maps of an environment took, milliseconds: its share of the build, and the decoding of its source,
+    /// whenever that was; `None` if none of them was made.
+    pub fn taken_ms(&self, env: &str) -> Option<f64> {
+        let of_env = format!("env/{env}");
+        let is_its = |name: &str| {
+            name.split(' ').any(|word| {
+                word.strip_prefix(&of_env).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+            })
+        };
+        let wall_ms = |id: ActionId| {
+            let record = self.report.outcome(id).record.as_ref();
+            record.map_or(0.0, |record| record.result.wall_ms)
+        };
+        let name = |id: ActionId| self.plan.graph.action(id).name.as_str();
+        let all: f64 = self.report.ended.iter().map(|id| wall_ms(*id)).sum();
+        let its: Vec<ActionId> = self.report.ended.iter().copied().filter(|id| is_its(name(*id))).collect();
+        let share = its.iter().map(|id| wall_ms(*id)).sum::<f64>() / all.max(f64::MIN_POSITIVE);
+        let decode = format!("decode {of_env}");
+        let before =
+            self.plan.graph.iter().map(|(id, _)| id).find(|id| name(*id) == decode && !its.contains(id));
+        (!its.is_empty()).then(|| self.run_ms * share + before.map_or(0.0, wall_ms))
+    }
+
     /// What keeps a target from being what its sources say: the errors of the actions behind it. `None` if it is well.
     pub fn trouble_of(&self, target: &TargetSpec) -> Option<Vec<Diagnostic>> {
         if self.targets.get(&target.name).is_some_and(|target| target.state == TargetState::Fresh) {

@@ -4,6 +4,7 @@ use kiln_bake::{RoughnessLaw, TexelFormat};
 use kiln_image::{FACE_NAMES, Layout, TexelPolicy};
 
 use crate::config::normalised;
+use crate::profile::{self, PROFILE_NAMES};
 use crate::reader::Section;
 
 /// An environment and the quality it is baked with.
@@ -33,8 +34,12 @@ pub struct EnvConfig {
     pub sh_order: usize,
     /// Whether the irradiance's harmonics are windowed until they are nowhere negative.
     pub is_sh_windowed: bool,
-    /// Error asked for, relative RMS, encoding included.
+    /// Error asked for, relative RMS, encoding included. Where a time is asked for, the one that was chosen for it.
     pub error: f64,
+    /// What a bake of all that is read of it may take, in milliseconds; `None` asks for an error.
+    pub time_ms: Option<f64>,
+    /// Whether `size` is nobody's wish.
+    pub is_size_open: bool,
     /// Texel format.
     pub format: TexelFormat,
     /// What happens to values that a format cannot hold.
@@ -73,6 +78,8 @@ impl EnvConfig {
             sh_order: 2,
             is_sh_windowed: false,
             error: 1e-3,
+            time_ms: None,
+            is_size_open: true,
             format: TexelFormat::Rgba16Float,
             range: Range::Scale,
             texels: TexelPolicy::Repair,
@@ -121,11 +128,18 @@ pub fn format_name(format: TexelFormat) -> &'static str {
 
 pub(crate) fn read_env(section: &mut Section) -> EnvConfig {
     let mut config = EnvConfig::new(read_sources(section));
+    let profiles = PROFILE_NAMES.map(|name| (name, name));
+    let profile = section.choice("profile", &profiles);
+    if let Some(name) = profile {
+        profile::apply(name, &mut config);
+    }
     let default = config.clone();
     let layouts = Layout::ALL.map(|layout| (layout.name(), Some(layout)));
     let layouts: Vec<(&str, Option<Layout>)> = std::iter::once(("auto", None)).chain(layouts).collect();
     config.layout = section.choice("layout", &layouts).unwrap_or(default.layout);
-    config.size = section.integer("size", 1..=4096).unwrap_or(default.size);
+    let size = section.integer("size", 1..=4096);
+    config.is_size_open = size.is_none() && profile.is_none();
+    config.size = size.unwrap_or(default.size);
     config.skybox_size = section.integer("skybox_size", 1..=4096);
     config.irradiance_size = section.integer("irradiance_size", 1..=1024).unwrap_or(default.irradiance_size);
     config.has_sheen = section.boolean("sheen").unwrap_or(default.has_sheen);
@@ -135,7 +149,19 @@ pub(crate) fn read_env(section: &mut Section) -> EnvConfig {
     config.sh_order = section.integer("sh_order", 0..=8).unwrap_or(default.sh_order);
     let windows = [("none", false), ("dering", true)];
     config.is_sh_windowed = section.choice("sh_window", &windows).unwrap_or(default.is_sh_windowed);
-    config.error = section.number("error", 1e-7..=1.0).unwrap_or(default.error);
+    let error = section.number("error", 1e-7..=1.0);
+    config.error = error.unwrap_or(default.error);
+    config.time_ms = section.number("time_ms", 1.0..=3.6e6);
+    if config.time_ms.is_some() && (error.is_some() || profile.is_some()) {
+        let other = if error.is_some() { "error" } else { "profile" };
+        let message = format!("`time_ms` and `{other}` both say how good the maps are");
+        section.fail(
+            message,
+            section.place("time_ms"),
+            Some(format!("take out one; with `time_ms` Kiln chooses the error, and says which")),
+        );
+        config.time_ms = None;
+    }
     config.format = section.choice("format", &FORMATS).unwrap_or(default.format);
     config.range =
         section.choice("range", &[("scale", Range::Scale), ("f32", Range::F32)]).unwrap_or(default.range);

@@ -24,12 +24,15 @@ pub use kiln_bake::{BAND_LIMIT_MAX, RoughnessLaw, TexelFormat, decode_level, pan
 pub use kiln_export::{ExportFile, Preset};
 pub use kiln_image::{FACE_NAMES, Layout, TexelPolicy};
 pub use kiln_scene::{Effect, EffectOverrides, EffectSet, LightReads, MaterialEffects};
+pub use lock::{LOCK_FILE, Lock, LockedEnv};
 pub use lut_config::{LutConfig, TABLES, table_name};
 pub use output::{
     MANIFEST_FILE, Manifest, ManifestFile, ManifestTarget, Written, lock_folder, manifest_of, write_outputs,
 };
 pub use plan::{PartSpec, Plan, TargetSpec, Wishes, plan, plan_with};
+pub use profile::PROFILE_NAMES;
 pub use reader::{parse_bytes, suggest};
+pub use settle::{Choice, settle};
 pub use skipped::{Skipped, made, skipped};
 pub use verify::{Mismatch, Verified, VerifyError, verify};
 pub use why::{ActionWhy, CutOff, last_build, why, with_values};
@@ -46,13 +49,16 @@ mod demand;
 mod env_config;
 mod environment;
 mod export;
+mod lock;
 mod lut;
 mod lut_config;
 mod output;
 mod plan;
+mod profile;
 mod reader;
 mod replace;
 mod scene;
+mod settle;
 mod shader;
 mod skipped;
 #[cfg(test)]

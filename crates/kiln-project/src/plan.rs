@@ -12,8 +12,8 @@ use serde_json::{Map, Value, json};
 
 use crate::demand::env_demands;
 use crate::{
-    EffectOverrides, EnvDemand, PROJECT_FILE, Project, SceneDemand, environment, lut, parse_project, scene,
-    shader,
+    EffectOverrides, EnvDemand, PROJECT_FILE, Project, SceneDemand, environment, lock, lut, parse_project,
+    scene, shader,
 };
 
 /// What must be done for a project, before any of it is done.
@@ -30,6 +30,8 @@ pub struct Plan {
     pub envs: BTreeMap<String, EnvDemand>,
     /// What is wrong with kiln.toml or found while planning.
     pub diagnostics: Vec<Diagnostic>,
+    /// Environments that ask for a time and of which `kiln.lock` says nothing that still holds; see [`crate::settle()`].
+    pub open: Vec<String>,
     /// What was wanted besides.
     pub wishes: Wishes,
     /// The file that an action's messages are about, where they name none themselves.
@@ -182,12 +184,22 @@ pub fn plan(engine: &Engine, changed: Option<&[String]>) -> Result<Plan, Error> 
 pub fn plan_with(engine: &Engine, changed: Option<&[String]>, wishes: Wishes) -> Result<Plan, Error> {
     engine.begin_plan(changed);
     let mut diagnostics = Vec::new();
-    let project = read_project(engine, &mut diagnostics);
+    let mut project = read_project(engine, &mut diagnostics);
+    let open = lock::apply(engine, &mut project, &mut diagnostics);
+    for name in &open {
+        let error = project.envs[name].error;
+        let message = format!("nothing is chosen yet for the `time_ms` of env.{name}: it has error {error}");
+        diagnostics.push(
+            Diagnostic::note(message)
+                .in_file(PROJECT_FILE)
+                .with_help("`kiln bake` chooses, and writes kiln.lock"),
+        );
+    }
     if project.envs.values().any(|env| env.law != RoughnessLaw::Linear) {
         let message = "the preview reads specular levels as linear in roughness; `law` is for engines";
         diagnostics.push(Diagnostic::note(message).in_file(PROJECT_FILE));
     }
-    plan_project(engine, project, diagnostics, wishes)
+    Ok(Plan { open, ..plan_project(engine, project, diagnostics, wishes)? })
 }
 
 /// Plans what a project asks for, wherever that was written.
@@ -252,7 +264,8 @@ pub(crate) fn plan_project(
         );
     }
     let Planner { graph, targets, diagnostics, subjects } = planner;
-    Ok(Plan { project, graph, targets, scenes, envs, diagnostics, wishes, subjects })
+    let open = Vec::new();
+    Ok(Plan { project, graph, targets, scenes, envs, diagnostics, open, wishes, subjects })
 }
 
 /// Maps and tables of the preview's shaders that are not made because nothing reads them.

@@ -353,6 +353,9 @@ pub(crate) struct BakeArgs {
     /// The manifest to check against [default: manifest.json in the project's output folder]
     #[arg(long, value_name = "FILE", requires = "check")]
     pub(crate) manifest: Option<PathBuf>,
+    /// Choose nothing where kiln.toml asks for a time: exit with 1 unless kiln.lock says what to bake
+    #[arg(long)]
+    pub(crate) locked: bool,
     /// Write a JUnit report, a test case for each target
     #[arg(long, value_name = "FILE")]
     pub(crate) junit: Option<PathBuf>,

@@ -84,6 +84,13 @@ pub(crate) fn plan_environment(
     }
 }
 
+/// Adds the one action that reads an environment's source.
+pub(crate) fn plan_decode(planner: &mut Planner, engine: &Engine, name: &str, env: &EnvConfig) -> ActionId {
+    let decode = planner.graph.add(Steps { name, env }.decode(engine));
+    planner.graph.want(decode);
+    decode
+}
+
 /// An environment's actions as they are added.
 struct EnvPlan<'a, 'p> {
     planner: &'p mut Planner,
@@ -454,7 +461,7 @@ impl Steps<'_> {
 /// 0.1 are baked for this α.
 const SHEEN_ALPHA_MIN: f64 = 0.1 * 0.1;
 
-fn sheen_alpha(roughness: f64) -> f64 {
+pub(crate) fn sheen_alpha(roughness: f64) -> f64 {
     (roughness * roughness).max(SHEEN_ALPHA_MIN)
 }
 

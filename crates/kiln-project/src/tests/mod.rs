@@ -14,6 +14,7 @@ mod edits;
 mod effects;
 mod outputs;
 mod outside;
+mod settle;
 mod wishes;
 mod write_back;
 

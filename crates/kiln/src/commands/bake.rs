@@ -10,7 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use kiln_build::{Engine, Error, Progress, Status, Store};
 use kiln_diagnostic::{Diagnostic, has_errors};
 use kiln_project::{
-    Built, Difference, DifferenceKind, HEALING_TRIES_MAX, MANIFEST_FILE, Manifest, Written, build,
+    Built, Choice, Difference, DifferenceKind, HEALING_TRIES_MAX, MANIFEST_FILE, Manifest, Written, build,
     differences, manifest_of, write_outputs,
 };
 use serde_json::json;
@@ -25,6 +25,7 @@ pub(crate) fn run(args: &BakeArgs) -> anyhow::Result<ExitCode> {
     let cache_bytes_max = place::cache_bytes_max()?;
     let hold = engine.store().hold();
     let mut tries = 0;
+    let choices = choose(&engine, args)?;
     let (built, effect) = loop {
         let built = build_with_progress(&engine, args)?;
         match apply(&engine, args, &built) {
@@ -39,7 +40,11 @@ pub(crate) fn run(args: &BakeArgs) -> anyhow::Result<ExitCode> {
         }
     };
     engine.save_memory().context("remembering the build")?;
-    let report = Report::new(&engine, built, effect);
+    let mut report = Report::new(&engine, built, effect);
+    report.choices = choices;
+    if args.locked {
+        report.complaints.extend(report.built.plan.open.iter().map(|env| not_locked(env)));
+    }
     if let Some(path) = &args.junit {
         let xml = ci::junit("kiln bake", &report.test_cases());
         kiln_build::write_atomically(&kiln_build::Disk, path, xml.as_bytes())
@@ -108,6 +113,37 @@ fn apply(engine: &Engine, args: &BakeArgs, built: &Built) -> anyhow::Result<Effe
     Ok(Effect::Checked(found, present))
 }
 
+/// Chooses how good environments are that ask for a time. What a check compares with was chosen when that was baked.
+fn choose(engine: &Engine, args: &BakeArgs) -> anyhow::Result<Vec<Choice>> {
+    if args.check || args.locked {
+        return Ok(Vec::new());
+    }
+    let cancel = AtomicBool::new(false);
+    let options = place::run_options(&args.build, args.keep_going, &cancel, &|_| {});
+    kiln_project::settle(engine, &options).context("choosing for the times that kiln.toml asks for")
+}
+
+fn not_locked(env: &str) -> Diagnostic {
+    Diagnostic::error(format!("kiln.lock does not say how to bake env.{env} within its `time_ms`"))
+        .in_file(kiln_project::LOCK_FILE)
+        .with_help("`kiln bake` without --locked chooses; commit the kiln.lock that it writes")
+}
+
+/// What a choice says, and what it came to.
+fn describe_choice(choice: &Choice, built: &Built) -> String {
+    let Choice { env, time_ms, expected_ms, locked, fits } = choice;
+    let took = built.taken_ms(env).map_or_else(String::new, |ms| format!(", took {}", report::duration(ms)));
+    let misfit = if *fits { "" } else { " (nothing coarser to choose)" };
+    format!(
+        "env/{env}: {} asked, {} expected{misfit}{took}; error {} at {} texels a face, in {}",
+        report::duration(*time_ms),
+        report::duration(*expected_ms),
+        locked.error,
+        locked.size,
+        kiln_project::LOCK_FILE
+    )
+}
+
 fn build_with_progress(engine: &Engine, args: &BakeArgs) -> anyhow::Result<Built> {
     let bar = progress_bar();
     let progress = show_progress(&bar);
@@ -169,6 +205,8 @@ struct Report {
     damaged: usize,
     /// What the check has to say, besides the build.
     complaints: Vec<Diagnostic>,
+    /// What was chosen for times that are asked for, before the build.
+    choices: Vec<Choice>,
 }
 
 /// Shader variants of a build.
@@ -219,6 +257,7 @@ impl Report {
             built,
             effect,
             complaints,
+            choices: Vec::new(),
         }
     }
 
@@ -243,6 +282,7 @@ impl Report {
             let shared = asked.saturating_sub(artefacts);
             say!("shader variants: {asked} asked, {compiled} compiled, {shared} shared");
         }
+        self.choices.iter().for_each(|choice| say!("{}", describe_choice(choice, built)));
         report::print_diagnostics(&built.diagnostics, !work.ran.is_empty());
         report::print_diagnostics(&self.complaints, true);
         say!(
@@ -362,6 +402,15 @@ impl Report {
             "sources": {"looked_at": self.sources, "hashed": self.hashed.0, "hashed_bytes": self.hashed.1},
             "damaged": self.damaged,
         });
+        if !self.choices.is_empty() {
+            let choice = |choice: &Choice| {
+                json!({
+                    "env": choice.env, "time_ms": choice.time_ms, "expected_ms": choice.expected_ms,
+                    "taken_ms": built.taken_ms(&choice.env), "fits": choice.fits, "locked": choice.locked,
+                })
+            };
+            json["choices"] = self.choices.iter().map(choice).collect();
+        }
         match &self.effect {
             Effect::Written(written) => {
                 json["written"] = json!(written.written);
