@@ -33,3 +33,4 @@ mod storms;
 mod tidy;
 #[cfg(feature = "preview")]
 mod window;
+mod wire_options;

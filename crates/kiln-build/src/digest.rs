@@ -120,6 +120,22 @@ impl<'de> Deserialize<'de> for Digest {
     }
 }
 
+/// Makes the digest of bytes that come in pieces.
+#[derive(Clone, Default)]
+pub struct DigestBuilder(Sha256);
+
+impl DigestBuilder {
+    /// The next piece.
+    pub fn update(&mut self, bytes: &[u8]) {
+        self.0.update(bytes);
+    }
+
+    /// The digest of all pieces.
+    pub fn finish(self) -> Digest {
+        Digest(self.0.finalize().into())
+    }
+}
+
 /// Hashes a list of named fields so that no two different lists hash alike: every field is prefixed
 /// by the length of its name and of its value (8 bytes each, little-endian).
 #[derive(Default)]

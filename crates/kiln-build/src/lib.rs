@@ -13,7 +13,7 @@
 
 pub use action::{Action, ActionId, ActionOutput, Graph, Input, Inputs, MemoryNeed, Perform, little_memory};
 pub use collect::{CollectOptions, Collected, ProjectUsage, Usage};
-pub use digest::Digest;
+pub use digest::{Digest, DigestBuilder};
 pub use engine::{Engine, Scan, Tracker};
 pub use explain::{Change, Reason};
 pub use fs::{Disk, FileFacts, FileSystem, write_atomically};

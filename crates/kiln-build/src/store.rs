@@ -14,7 +14,7 @@
 //! fails the check is dropped and counts as absent. A cache that cannot be written is read, and what it lacks goes to a
 //! temporary folder.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -92,6 +92,9 @@ impl Error {
     }
 }
 
+/// Blobs that are remembered as hashed.
+const HASHED_MAX: usize = 65_536;
+
 /// Artefacts by digest, and the record of which action made what.
 #[derive(Debug)]
 pub struct Store {
@@ -101,6 +104,8 @@ pub struct Store {
     scratch: Option<tempfile::TempDir>,
     /// Files that are of no use and could not be removed.
     useless: Mutex<HashSet<PathBuf>>,
+    /// Blobs that were hashed, and what `stat` said of them before.
+    hashed: Mutex<HashMap<PathBuf, FileFacts>>,
     damaged: AtomicUsize,
     written_bytes: AtomicU64,
 }
@@ -141,6 +146,7 @@ impl Store {
             root,
             scratch,
             useless: Mutex::default(),
+            hashed: Mutex::default(),
             damaged: AtomicUsize::new(0),
             written_bytes: AtomicU64::new(0),
         })
@@ -234,6 +240,27 @@ impl Store {
             self.drop_damaged(&path);
         }
         None
+    }
+
+    /// Does what [`Store::get`] does, and does not hash a file again that is as it was: for bytes that many ask for, and that each of
+    /// them checks.
+    pub fn get_again(&self, digest: &Digest) -> Option<Arc<[u8]>> {
+        let paths = self.paths(BLOBS, digest, "");
+        let facts = paths.iter().find_map(|path| Some((path, self.fs.facts(path).ok()?)));
+        if let Some((path, facts)) = facts
+            && lock(&self.hashed).get(path) == Some(&facts)
+            && let Some(bytes) = self.read_if_present(path)
+            && bytes.len() as u64 == facts.bytes
+        {
+            return Some(bytes.into());
+        }
+        let bytes = self.get(digest)?;
+        let mut hashed = lock(&self.hashed);
+        if hashed.len() >= HASHED_MAX {
+            hashed.clear();
+        }
+        hashed.extend(facts.map(|(path, facts)| (path.clone(), facts)));
+        Some(bytes)
     }
 
     /// Whether a blob of this name and length is there (its content is checked when it is read).

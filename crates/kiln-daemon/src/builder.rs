@@ -1,6 +1,6 @@
 //! The thread that builds: one batch at a time, cancelled by the next.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -14,6 +14,9 @@ use crate::watch::Batch;
 
 /// A watcher that works tells of a change within this time.
 const TOLD_WITHIN: Duration = Duration::from_millis(700);
+
+/// What is to be built: why, and environments at another error than their own.
+type Order = (Batch, BTreeMap<String, f64>);
 
 /// A finished build, as the loop sees it.
 pub(crate) enum BuildResult {
@@ -32,7 +35,7 @@ pub(crate) enum BuildResult {
 }
 
 pub(crate) struct Builder {
-    requests: Option<Sender<Batch>>,
+    requests: Option<Sender<Order>>,
     cancel: Arc<AtomicBool>,
     /// Requests that the thread has not taken yet.
     waiting: Arc<AtomicUsize>,
@@ -76,12 +79,12 @@ impl Builder {
         Builder { requests: Some(requests), cancel, waiting, thread: Some(thread) }
     }
 
-    pub(crate) fn request(&self, batch: Batch) {
+    pub(crate) fn request(&self, batch: Batch, errors: BTreeMap<String, f64>) {
         self.cancel.store(false, Ordering::SeqCst);
         if let Some(requests) = &self.requests {
             self.waiting.fetch_add(1, Ordering::SeqCst);
             // The thread lives as long as the builder does.
-            let _ = requests.send(batch);
+            let _ = requests.send((batch, errors));
         }
     }
 
@@ -99,24 +102,25 @@ struct BuilderThread {
 }
 
 impl BuilderThread {
-    fn run(&self, requests: &Receiver<Batch>, built: &(impl Fn(BuildResult) + Sync)) {
+    fn run(&self, requests: &Receiver<Order>, built: &(impl Fn(BuildResult) + Sync)) {
         // The watcher tells what changes from here on; before it, anything may have.
         let mut knows_all = false;
         let mut next = None;
-        while let Some(batch) = next.take().or_else(|| self.wait(requests, built)) {
+        while let Some((batch, errors)) = next.take().or_else(|| self.wait(requests, built)) {
             self.waiting.fetch_sub(1, Ordering::SeqCst);
             let changed: Option<Vec<String>> =
                 (knows_all && !batch.files.is_empty()).then(|| batch.files.iter().cloned().collect());
             // No collection may take what a build counts on.
             let hold = self.engine.store().hold();
-            match Self::guarded(|| self.build(changed.as_deref(), &batch, built)) {
+            match Self::guarded(|| self.build(changed.as_deref(), &batch, &errors, built)) {
                 Ok(None) => built(BuildResult::Cancelled(batch)),
                 Ok(Some(done)) => {
                     knows_all = true;
+                    let has_other_maps = done.plan.wishes.change_maps();
                     let (targets, output_dir) = (done.targets.clone(), done.plan.project.output_dir.clone());
                     built(BuildResult::Done(Box::new(to_table(done, batch))));
                     // Clients first; files for engines and the memory can follow.
-                    let write = || match self.options.write_outputs {
+                    let write = || match self.options.write_outputs && !has_other_maps {
                         true => write_outputs(&self.engine, &targets, &output_dir).map(drop),
                         false => Ok(()),
                     };
@@ -139,16 +143,16 @@ impl BuilderThread {
     }
 
     /// The next request; while there is none, files are looked at as often as asked for.
-    fn wait(&self, requests: &Receiver<Batch>, built: &impl Fn(BuildResult)) -> Option<Batch> {
+    fn wait(&self, requests: &Receiver<Order>, built: &impl Fn(BuildResult)) -> Option<Order> {
         let Some(poll) = self.options.poll else { return requests.recv().ok() };
         loop {
             match requests.recv_timeout(poll) {
-                Ok(batch) => return Some(batch),
+                Ok(order) => return Some(order),
                 Err(RecvTimeoutError::Disconnected) => return None,
                 Err(RecvTimeoutError::Timeout) => {}
             }
-            if let Some(batch) = self.look_for_overlooked(requests, built) {
-                return Some(batch);
+            if let Some(order) = self.look_for_overlooked(requests, built) {
+                return Some(order);
             }
         }
     }
@@ -156,7 +160,7 @@ impl BuilderThread {
     /// A file system may not tell of every change (a network's, a link that leads elsewhere now): while there is nothing
     /// else to do all files are looked at, by `stat` alone. A change that is told of a moment later is no such one: then
     /// its request is returned.
-    fn look_for_overlooked(&self, requests: &Receiver<Batch>, built: &impl Fn(BuildResult)) -> Option<Batch> {
+    fn look_for_overlooked(&self, requests: &Receiver<Order>, built: &impl Fn(BuildResult)) -> Option<Order> {
         let is_idle = || self.waiting.load(Ordering::SeqCst) == 0 && !self.cancel.load(Ordering::SeqCst);
         let sources = self.engine.sources();
         let changed = sources.changed_since_seen(&sources.looked_at(), is_idle);
@@ -164,7 +168,7 @@ impl BuilderThread {
             return None;
         }
         match requests.recv_timeout(self.options.poll.map_or(TOLD_WITHIN, |poll| poll.min(TOLD_WITHIN))) {
-            Ok(batch) => Some(batch),
+            Ok(order) => Some(order),
             Err(_) => {
                 built(BuildResult::Overlooked(changed));
                 None
@@ -176,6 +180,7 @@ impl BuilderThread {
         &self,
         changed: Option<&[String]>,
         batch: &Batch,
+        errors: &BTreeMap<String, f64>,
         built: &(impl Fn(BuildResult) + Sync),
     ) -> Result<Option<Built>, Error> {
         let (done, total) = (AtomicUsize::new(0), AtomicUsize::new(0));
@@ -210,7 +215,7 @@ impl BuilderThread {
             })));
         };
         let wants = self.server.wanted();
-        let wishes = Wishes::among(wants.targets.iter());
+        let wishes = Wishes { errors: errors.clone(), ..Wishes::among(wants.targets.iter()) };
         let is_wanted = |target: &str| wants.include(target);
         let result = build_wanted_first(&self.engine, changed, wishes, &is_wanted, &early, &options);
         report("");

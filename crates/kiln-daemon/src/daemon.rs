@@ -1,6 +1,7 @@
 //! The loop.
 
 use std::collections::{BTreeSet, HashSet};
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -8,9 +9,11 @@ use std::time::{Duration, Instant, SystemTime};
 
 use kiln_build::{Engine, Error, Store};
 use kiln_diagnostic::Diagnostic;
-use kiln_link::{LockError, ProjectLock, RevisionTable, Server, ServerEvent, socket_path};
+use kiln_link::{Answer, Ask, LockError, ProjectLock, RevisionTable, Server, ServerEvent, socket_path};
 use kiln_project::Wishes;
+use tracing::{debug, error, info, warn};
 
+use crate::accuracy::Accuracy;
 use crate::builder::{BuildResult, Builder, BuilderOptions};
 use crate::requests::Requests;
 use crate::watch::{Batch, UNFINISHED, Watch, send_batches, unix_ms};
@@ -32,6 +35,8 @@ pub struct DaemonOptions {
     pub write_outputs: bool,
     /// How often an idle daemon looks at all files itself, where the system may not tell of every change.
     pub poll: Option<Duration>,
+    /// Where it listens besides its socket: an address of this machine alone.
+    pub listen: Option<SocketAddr>,
 }
 
 /// Why a daemon could not start.
@@ -49,6 +54,14 @@ pub enum DaemonError {
         /// Where it should be.
         socket: PathBuf,
         /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The address cannot be listened at.
+    #[error("cannot listen at {address}: {source}")]
+    Listen {
+        /// What was asked for.
+        address: SocketAddr,
+        /// The reason.
         source: std::io::Error,
     },
     /// The folder cannot be watched.
@@ -114,6 +127,7 @@ pub struct Daemon {
     builder: Builder,
     watch: Watch,
     socket: PathBuf,
+    tcp: Option<(SocketAddr, PathBuf)>,
     published: Option<Arc<RevisionTable>>,
     /// Edits that the build in flight has not seen; `None` while no build is in flight.
     building: Option<Batch>,
@@ -128,6 +142,9 @@ pub struct Daemon {
     /// What clients wished for when the last build began.
     built_for: Wishes,
     requests: Requests,
+    accuracy: Accuracy,
+    /// The build in flight was cancelled because clients wish for something else, and not by an edit.
+    is_superseded: bool,
     _lock: ProjectLock,
 }
 
@@ -144,15 +161,18 @@ impl Daemon {
         let blobs = engine.clone();
         let lost = sender.clone();
         let blobs = Box::new(move |digest: &_| {
-            let bytes = blobs.store().get(digest);
+            let bytes = blobs.store().get_again(digest);
             if bytes.is_none() {
                 // Fails only when the daemon has ended.
                 let _ = lost.send(Event::ContentLost);
             }
             bytes
         });
-        let server =
+        let mut server =
             Server::bind(&socket, &name, blobs, client_events(sender.clone())).map_err(at(socket.clone()))?;
+        let listen =
+            |address| server.listen(address).map_err(|source| DaemonError::Listen { address, source });
+        let tcp = options.listen.map(listen).transpose()?;
         let server = Arc::new(server);
         let mut watch = Watch::start(&folder, send_batches(sender.clone(), Event::Files))?;
         watch.set_relevant(&[kiln_project::PROJECT_FILE.to_owned()]);
@@ -177,6 +197,7 @@ impl Daemon {
             builder,
             watch,
             socket,
+            tcp,
             published: None,
             building: None,
             is_incomplete: false,
@@ -185,6 +206,8 @@ impl Daemon {
             relevant_version: 0,
             built_for: Wishes::default(),
             requests,
+            accuracy: Accuracy::default(),
+            is_superseded: false,
             _lock: lock,
         };
         daemon.begin_build(Batch::default());
@@ -201,6 +224,11 @@ impl Daemon {
         &self.socket
     }
 
+    /// Where it listens besides, and the file with the token that clients show there.
+    pub fn tcp(&self) -> Option<&(SocketAddr, PathBuf)> {
+        self.tcp.as_ref()
+    }
+
     /// Serves until stopped.
     pub fn run(mut self, notify: &mut dyn FnMut(Notice)) {
         notify(Notice::Building { files: Vec::new() });
@@ -209,8 +237,15 @@ impl Daemon {
                 Event::Stop => return self.builder.cancel(),
                 Event::Client(event) => {
                     let is_stop = event == ServerEvent::StopAsked;
-                    if let ServerEvent::Asked { client, request } = &event {
-                        self.requests.ask(*client, request.clone());
+                    match &event {
+                        ServerEvent::Asked { client, request } => match &request.ask {
+                            Ask::BakeAtError { env, error } => {
+                                self.set_error(*client, request.id, env, *error)
+                            }
+                            _ => self.requests.ask(*client, request.clone()),
+                        },
+                        ServerEvent::Gone { client, .. } => self.accuracy.forget(*client),
+                        _ => {}
                     }
                     notify(Notice::Client(event));
                     if is_stop {
@@ -219,6 +254,7 @@ impl Daemon {
                     self.heed_wishes();
                 }
                 Event::ContentLost => {
+                    warn!(target: "wire", "a content that was asked for is no longer in the store");
                     self.is_incomplete = true;
                     if self.building.is_none() {
                         self.begin_build(Batch::default());
@@ -252,10 +288,12 @@ impl Daemon {
     fn take_files(&mut self, batch: Batch, notify: &mut dyn FnMut(Notice)) {
         match &mut self.building {
             Some(unseen) => {
+                info!(target: "watch", files = batch.files.len(), first = batch.files.first(), "changed during a build");
                 unseen.merge(batch);
                 self.builder.cancel();
             }
             None => {
+                info!(target: "watch", files = batch.files.len(), first = batch.files.first(), "changed");
                 notify(Notice::Building { files: batch.files.iter().cloned().collect() });
                 self.begin_build(batch);
             }
@@ -263,26 +301,61 @@ impl Daemon {
     }
 
     fn wishes(&self) -> Wishes {
-        Wishes::among(self.server.wanted().targets.iter())
+        Wishes { errors: self.accuracy.errors(), ..Wishes::among(self.server.wanted().targets.iter()) }
     }
 
-    /// Builds anew if clients want something else than the last build was for.
+    /// Builds anew if clients want something else than the last build was for. Maps that nobody waits for any more are given up.
     fn heed_wishes(&mut self) {
-        if self.building.is_none() && self.wishes() != self.built_for {
-            self.begin_build(Batch::default());
+        let wishes = self.wishes();
+        if self.building.is_none() {
+            if wishes != self.built_for {
+                self.begin_build(Batch::default());
+            }
+        } else if wishes.errors != self.built_for.errors && !self.is_superseded {
+            self.is_superseded = true;
+            self.builder.cancel();
+        }
+    }
+
+    /// Notes at which error a client wants an environment; the answer comes with the revision that has it.
+    fn set_error(&mut self, client: u64, id: u64, env: &str, error: Option<f64>) {
+        let is_known = self.published.as_ref().is_some_and(|table| {
+            let envs = table.targets.get("project").and_then(|project| project.meta["envs"].as_array());
+            envs.is_some_and(|envs| envs.iter().any(|known| known == env))
+        });
+        if !is_known {
+            let fault =
+                Diagnostic::error(format!("the project has no environment `{env}`, or is not built yet"));
+            return self.server.answer(client, Answer::refused(id, fault));
+        }
+        let superseded = self.accuracy.ask(client, id, env, error);
+        superseded.into_iter().for_each(|(client, answer)| self.server.answer(client, answer));
+        if self.building.is_none() {
+            self.answer_fulfilled();
+        }
+    }
+
+    /// Answers those whose error the last build had.
+    fn answer_fulfilled(&mut self) {
+        let Some(revision) = self.published.as_ref().map(|table| table.number) else { return };
+        for (client, answer) in self.accuracy.fulfil(&self.built_for.errors, revision) {
+            self.server.answer(client, answer);
         }
     }
 
     fn begin_build(&mut self, batch: Batch) {
-        // The builder looks again when it begins: who comes in between is heard of, and may cost an idle build.
+        // The builder looks again at what is shown when it begins: who comes in between is heard of, and may cost an idle build.
         self.built_for = self.wishes();
+        self.is_superseded = false;
+        debug!(target: "build", files = batch.files.len(), wishes = ?self.built_for, "begins");
         self.building = Some(Batch::default());
         self.server.set_building(Some(batch.files.iter().cloned().collect()));
-        self.builder.request(batch);
+        self.builder.request(batch, self.built_for.errors.clone());
     }
 
     fn end_build(&mut self, result: BuildResult, notify: &mut dyn FnMut(Notice)) {
         let is_failure = matches!(result, BuildResult::Failed(_));
+        let is_cancelled = matches!(result, BuildResult::Cancelled(_));
         let mut unseen = match &result {
             // The next build may be running already.
             // Something damaged was dropped: it must be made anew.
@@ -292,11 +365,18 @@ impl Daemon {
                 }
                 return;
             }
-            BuildResult::OutputsFailed(error) => return notify(Notice::Failed(error.to_string())),
+            BuildResult::OutputsFailed(error) => {
+                error!(target: "build", %error, "its files were not written");
+                return notify(Notice::Failed(error.to_string()));
+            }
             BuildResult::Overlooked(files) => {
+                warn!(target: "watch", ?files, "nobody told of a change");
                 return self.take_files(Batch::now(self.watch.with_other_names(files.clone())), notify);
             }
-            BuildResult::Cancelled(batch) => batch.clone(),
+            BuildResult::Cancelled(batch) => {
+                debug!(target: "build", files = batch.files.len(), "cancelled");
+                batch.clone()
+            }
             BuildResult::Done(_) | BuildResult::Early(_) | BuildResult::Failed(_) => Batch::default(),
         };
         unseen.merge(self.building.take().unwrap_or_default());
@@ -324,16 +404,23 @@ impl Daemon {
             BuildResult::Done(table) => {
                 let table = self.without_unfinished(*table, &unseen, notify);
                 self.publish(table, notify);
+                self.answer_fulfilled();
             }
-            BuildResult::Failed(error) => notify(Notice::Failed(error.to_string())),
+            BuildResult::Failed(error) => {
+                error!(target: "build", %error, "failed");
+                notify(Notice::Failed(error.to_string()));
+            }
             BuildResult::Cancelled(_)
             | BuildResult::Early(_)
             | BuildResult::OutputsFailed(_)
             | BuildResult::Overlooked(_) => {}
         }
+        let must_begin_again = std::mem::take(&mut self.is_superseded) && is_cancelled;
         if !unseen.files.is_empty() {
             notify(Notice::Building { files: unseen.files.iter().cloned().collect() });
             self.begin_build(unseen);
+        } else if must_begin_again {
+            self.begin_build(Batch::default());
         }
         self.heed_wishes();
     }
@@ -351,6 +438,7 @@ impl Daemon {
         let failed = hide_errors_of(&mut table, last, &unfinished);
         self.retry = None;
         if !failed.is_empty() {
+            info!(target: "watch", ?failed, "being written");
             notify(Notice::Unfinished { files: failed.iter().cloned().collect() });
             self.retry = Some((Instant::now() + UNFINISHED, failed));
         }
@@ -383,10 +471,13 @@ impl Daemon {
             && last.diagnostics == table.diagnostics
             && last.building == table.building
         {
+            debug!(target: "build", run_ms = table.work.run_ms, "changed nothing");
             return notify(Notice::Unchanged { files: table.work.changed_files });
         }
         table.number = self.published.as_ref().map_or(1, |last| last.number + 1);
         table.work.published_unix_ms = unix_ms(SystemTime::now());
+        let (number, ran, work) = (table.number, table.work.ran.len(), &table.work);
+        info!(target: "build", revision = number, ran, plan_ms = work.plan_ms, run_ms = work.run_ms, "published");
         let table = Arc::new(table);
         self.server.publish(table.clone());
         self.published = Some(table.clone());

@@ -12,6 +12,7 @@
 pub use builder::{to_revision, to_work};
 pub use daemon::{Daemon, DaemonError, DaemonOptions, Notice, StopHandle};
 
+mod accuracy;
 mod builder;
 mod daemon;
 mod requests;

@@ -67,6 +67,8 @@ impl Worker {
             let panicked =
                 |_| Answer::refused(0, Diagnostic::error("the daemon failed to do this; its log says more"));
             let answer = std::panic::catch_unwind(work).unwrap_or_else(panicked);
+            let (id, is_done) = (request.id, answer.is_done());
+            tracing::info!(target: "request", client, id, is_done, message = answer.message, "answered");
             server.answer(client, Answer { id: request.id, ..answer });
         }
     }
@@ -75,7 +77,8 @@ impl Worker {
         match &request.ask {
             Ask::WriteParameters { parameters } => self.write(parameters),
             Ask::AddFiles { paths } => self.add(paths),
-            Ask::Unknown => {
+            // The loop itself does that.
+            Ask::BakeAtError { .. } | Ask::Unknown => {
                 let fault = Diagnostic::error("this daemon does not know what it is asked to do");
                 Answer::refused(0, fault.with_help("end it with `kiln stop` and start the newer one"))
             }

@@ -2,10 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::io::{Read as _, Write as _};
-use std::net::Shutdown;
-use std::os::unix::net::UnixStream;
-use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -13,14 +10,18 @@ use kiln_diagnostic::Diagnostic;
 
 use crate::request::REQUESTS_MAX;
 use crate::session::ClientSession;
+use crate::transport::Stream;
 use crate::wire::Message as _;
 use crate::{
-    Answer, Ask, ClientMessage, Decoder, FrameReport, Hello, Request, Revision, ServerMessage, Wants,
-    capability, transport,
+    Answer, Ask, ClientMessage, Decoder, Endpoint, FrameReport, Hello, Quality, Request, Revision,
+    ServerMessage, Wants, capability,
 };
 
 /// How long a client waits before it looks for a daemon again.
 const RETRY: Duration = Duration::from_millis(200);
+
+/// Messages that are read and not yet looked at: while one content is checked the next arrives.
+const AHEAD_MAX: usize = 32;
 
 /// What happens on the wire, as a client's owner sees it.
 #[derive(Clone, Debug)]
@@ -60,14 +61,35 @@ pub struct Client {
 }
 
 impl Client {
-    /// Begins to talk to the daemon behind `socket`, now or whenever there is one; `name` is for its status lines.
-    pub fn connect(socket: PathBuf, name: &str) -> Client {
-        let (event_sender, events) = channel();
+    /// Begins to talk to the daemon at `endpoint` (a socket's path is one), now or whenever there is one; `name` is for its status
+    /// lines.
+    pub fn connect(endpoint: impl Into<Endpoint>, name: &str) -> Client {
+        let (sender, events) = channel();
+        Client::start(endpoint.into(), name, events, Box::new(move |event| sender.send(event).is_ok()))
+    }
+
+    /// Does what [`Client::connect`] does, and calls `tell` with each event from the thread that reads, without a step between;
+    /// [`Client::events`] has none. Once `tell` says false the client ends.
+    pub fn connect_and_tell(
+        endpoint: impl Into<Endpoint>,
+        name: &str,
+        tell: impl Fn(ClientEvent) -> bool + Send + 'static,
+    ) -> Client {
+        let (_, events) = channel();
+        Client::start(endpoint.into(), name, events, Box::new(tell))
+    }
+
+    fn start(endpoint: Endpoint, name: &str, events: Receiver<ClientEvent>, tell: Box<Tell>) -> Client {
         let (stop, stopped) = channel();
         let writer = Arc::new(Mutex::new(Writer::default()));
-        let talk = Talk { socket, name: name.to_owned(), events: event_sender, writer: writer.clone() };
+        let talk = Talk { endpoint, name: name.to_owned(), tell, writer: writer.clone() };
         let thread = std::thread::spawn(move || talk.run(&stopped));
         Client { events, writer, stop: Some(stop), thread: Some(thread) }
+    }
+
+    /// For threads that see frames and nothing else of the client.
+    pub fn reporter(&self) -> FrameReporter {
+        FrameReporter(self.writer.clone())
     }
 
     /// What happened, in order.
@@ -78,8 +100,15 @@ impl Client {
     /// Tells the daemon which targets are shown (names, or groups as `env/sky`); they come first. Holds for later
     /// connections too.
     pub fn want(&self, targets: Vec<String>) {
+        self.want_at(targets.into_iter().map(|name| (name, Quality::Final)).collect());
+    }
+
+    /// Does what [`Client::want`] does, and says how good each must be to be worth showing.
+    pub fn want_at(&self, targets: Vec<(String, Quality)>) {
+        let less = targets.iter().filter(|(_, quality)| *quality < Quality::Final).cloned();
+        let qualities = less.collect();
         let mut writer = self.lock_writer();
-        writer.wants = Wants { targets };
+        writer.wants = Wants { targets: targets.into_iter().map(|(name, _)| name).collect(), qualities };
         writer.send_wants();
     }
 
@@ -134,6 +163,17 @@ impl Client {
     }
 }
 
+/// Tells the daemon of frames from any thread.
+#[derive(Clone, Debug)]
+pub struct FrameReporter(Arc<Mutex<Writer>>);
+
+impl FrameReporter {
+    /// As [`Client::report_frame`].
+    pub fn report(&self, report: FrameReport) {
+        lock(&self.0).send(&ClientMessage::Frame(report));
+    }
+}
+
 fn lock(writer: &Mutex<Writer>) -> MutexGuard<'_, Writer> {
     writer.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -145,7 +185,7 @@ impl Drop for Client {
         writer.is_closed = true;
         if let Some(stream) = &writer.stream {
             // Wakes the reading thread; the stream may be broken already.
-            let _ = stream.shutdown(Shutdown::Both);
+            let _ = stream.shutdown();
         }
         drop(writer);
         if let Some(thread) = self.thread.take() {
@@ -158,7 +198,7 @@ impl Drop for Client {
 /// The sending end of the connection, while there is one.
 #[derive(Debug, Default)]
 struct Writer {
-    stream: Option<UnixStream>,
+    stream: Option<Stream>,
     /// The client is being dropped: no stream may be stored any more, because nobody would shut it down.
     is_closed: bool,
     wants: Wants,
@@ -192,10 +232,13 @@ impl Writer {
     }
 }
 
+/// Whether the owner still wants to hear more.
+type Tell = dyn Fn(ClientEvent) -> bool + Send;
+
 struct Talk {
-    socket: PathBuf,
+    endpoint: Endpoint,
     name: String,
-    events: Sender<ClientEvent>,
+    tell: Box<Tell>,
     writer: Arc<Mutex<Writer>>,
 }
 
@@ -210,14 +253,14 @@ impl Talk {
         loop {
             let (was_connected, reason) = match self.open() {
                 Ok(stream) => (true, self.talk(stream, &mut session)),
-                Err(error) => (false, describe_open_error(&self.socket, &error)),
+                Err(error) => (false, describe_open_error(&self.endpoint, &error)),
             };
             if !self.close_requests() {
                 return;
             }
             if was_connected || said.as_ref() != Some(&reason) {
                 said = Some(reason.clone());
-                if self.events.send(ClientEvent::Disconnected { reason }).is_err() {
+                if !(self.tell)(ClientEvent::Disconnected { reason }) {
                     return;
                 }
             }
@@ -237,15 +280,17 @@ impl Talk {
         open.into_iter().all(|id| {
             let lost = Diagnostic::error("the connection ended before the daemon answered")
                 .with_help("look whether it was done, and ask again if it was not");
-            self.events.send(ClientEvent::Answer(Answer::refused(id, lost))).is_ok()
+            (self.tell)(ClientEvent::Answer(Answer::refused(id, lost)))
         })
     }
 
-    fn open(&self) -> std::io::Result<UnixStream> {
-        let mut stream = UnixStream::connect(&self.socket)?;
-        transport::check_peer(&stream)?;
-        let hello = ClientMessage::Hello(Hello::new(&self.name, &[capability::REVISIONS]));
-        stream.write_all(&hello.encode())?;
+    fn open(&self) -> std::io::Result<Stream> {
+        let mut stream = Stream::connect(&self.endpoint)?;
+        let mut hello = Hello::new(&self.name, &[capability::REVISIONS]);
+        if let Endpoint::Tcp { token, .. } = &self.endpoint {
+            hello.token = Some(token.clone());
+        }
+        stream.write_all(&ClientMessage::Hello(hello).encode())?;
         let mut writer = self.lock_writer();
         if writer.is_closed {
             return Err(std::io::Error::other("the client has ended"));
@@ -258,57 +303,88 @@ impl Talk {
     }
 
     /// Listens until the connection ends; returns why it did.
-    fn talk(&self, mut stream: UnixStream, session: &mut ClientSession) -> String {
+    fn talk(&self, stream: Stream, session: &mut ClientSession) -> String {
         session.reset();
-        let mut decoder = Decoder::default();
-        let mut buffer = vec![0; 256 << 10];
-        loop {
-            match stream.read(&mut buffer) {
-                Ok(0) => return "the daemon ended the connection".to_owned(),
-                Ok(count) => decoder.push(&buffer[..count]),
-                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => continue,
-                Err(error) => return error.to_string(),
+        let (sender, messages) = sync_channel(AHEAD_MAX);
+        let result = std::thread::scope(|scope| {
+            let reading = scope.spawn(move || read_messages(stream, &sender));
+            for message in messages {
+                if let Err(reason) = self.take_message(message, session) {
+                    // Wakes the reading thread; the stream may be broken already.
+                    self.lock_writer().stream.iter().for_each(|stream| drop(stream.shutdown()));
+                    return Err(reason);
+                }
             }
-            if let Err(reason) = self.take_messages(&mut decoder, session) {
-                return reason;
+            Ok(reading.join().unwrap_or_else(|_| "reading panicked".to_owned()))
+        });
+        match result {
+            Ok(reason) if !session.is_greeted() && matches!(self.endpoint, Endpoint::Tcp { .. }) => {
+                format!("{reason} without a greeting: is the token that of this daemon?")
             }
+            Ok(reason) | Err(reason) => reason,
         }
     }
 
-    fn take_messages(&self, decoder: &mut Decoder, session: &mut ClientSession) -> Result<(), String> {
-        while let Some(message) =
-            decoder.next_message::<ServerMessage>().map_err(|error| error.to_string())?
-        {
-            let reaction = session.receive(message)?;
-            let mut writer = self.lock_writer();
-            if let Some(number) = reaction.pong {
-                writer.take_pong(number);
+    fn take_message(&self, message: ServerMessage, session: &mut ClientSession) -> Result<(), String> {
+        let reaction = session.receive(message)?;
+        let mut writer = self.lock_writer();
+        if let Some(number) = reaction.pong {
+            writer.take_pong(number);
+        }
+        writer.takes_requests = reaction.takes_requests.unwrap_or(writer.takes_requests);
+        for message in reaction.send {
+            let stream = writer.stream.as_mut().ok_or("the connection is closing")?;
+            stream.write_all(&message.encode()).map_err(|error| error.to_string())?;
+        }
+        drop(writer);
+        for event in reaction.events {
+            // An answer to nothing is passed over.
+            if let ClientEvent::Answer(answer) = &event
+                && !self.lock_writer().open_requests.remove(&answer.id)
+            {
+                continue;
             }
-            writer.takes_requests = reaction.takes_requests.unwrap_or(writer.takes_requests);
-            for message in reaction.send {
-                let stream = writer.stream.as_mut().ok_or("the connection is closing")?;
-                stream.write_all(&message.encode()).map_err(|error| error.to_string())?;
-            }
-            drop(writer);
-            for event in reaction.events {
-                // An answer to nothing is passed over.
-                if let ClientEvent::Answer(answer) = &event
-                    && !self.lock_writer().open_requests.remove(&answer.id)
-                {
-                    continue;
-                }
-                self.events.send(event).map_err(|_| "the client has ended".to_owned())?;
+            if !(self.tell)(event) {
+                return Err("the client has ended".to_owned());
             }
         }
         Ok(())
     }
 }
 
-fn describe_open_error(socket: &Path, error: &std::io::Error) -> String {
+/// Reads until the connection ends, or nobody listens; returns why.
+fn read_messages(mut stream: Stream, messages: &SyncSender<ServerMessage>) -> String {
+    let mut decoder = Decoder::default();
+    let mut buffer = vec![0; 256 << 10];
+    loop {
+        match stream.read(&mut buffer) {
+            Ok(0) => return "the daemon ended the connection".to_owned(),
+            Ok(count) => decoder.push(&buffer[..count]),
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => continue,
+            Err(error) => return error.to_string(),
+        }
+        loop {
+            match decoder.next_message::<ServerMessage>() {
+                Ok(None) => break,
+                Ok(Some(message)) => {
+                    if messages.send(message).is_err() {
+                        return "the client has ended".to_owned();
+                    }
+                }
+                Err(error) => return error.to_string(),
+            }
+        }
+    }
+}
+
+fn describe_open_error(endpoint: &Endpoint, error: &std::io::Error) -> String {
     match error.kind() {
         std::io::ErrorKind::NotFound | std::io::ErrorKind::ConnectionRefused => {
             "no daemon serves this project; start one with `kiln watch`".to_owned()
         }
-        _ => format!("cannot connect to {}: {error}", socket.display()),
+        _ => match endpoint {
+            Endpoint::Socket(socket) => format!("cannot connect to {}: {error}", socket.display()),
+            Endpoint::Tcp { address, .. } => format!("cannot connect to {address}: {error}"),
+        },
     }
 }

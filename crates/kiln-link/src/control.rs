@@ -1,14 +1,14 @@
 //! One question to a daemon, and its answer.
 
 use std::io::{Read as _, Write as _};
-use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use crate::transport::Stream;
 use crate::wire::Message as _;
 use crate::{
     Answer, Ask, ClientMessage, DaemonStatus, Decoder, Hello, PROTOCOL_VERSION, ProjectLock, Request,
-    ServerMessage, capability, transport,
+    ServerMessage, capability,
 };
 
 /// Why a daemon did not answer.
@@ -89,7 +89,7 @@ pub fn stop(socket: &Path, limit: Duration) -> Result<(), ControlError> {
 }
 
 struct Talk {
-    stream: UnixStream,
+    stream: Stream,
     decoder: Decoder,
     what: &'static str,
     limit: Duration,
@@ -100,11 +100,10 @@ struct Talk {
 impl Talk {
     fn open(socket: &Path, what: &'static str, limit: Duration) -> Result<Talk, ControlError> {
         use std::io::ErrorKind::{ConnectionRefused, NotFound};
-        let stream = UnixStream::connect(socket).map_err(|error| match error.kind() {
+        let stream = Stream::connect(&socket.to_owned().into()).map_err(|error| match error.kind() {
             NotFound | ConnectionRefused => ControlError::NoDaemon,
             _ => ControlError::Io(error),
         })?;
-        transport::check_peer(&stream)?;
         stream.set_write_timeout(Some(limit))?;
         let (decoder, deadline) = (Decoder::default(), Instant::now() + limit);
         let mut talk = Talk { stream, decoder, what, limit, deadline, takes_requests: false };

@@ -9,17 +9,20 @@
 //!
 //! Not here: what targets mean, when to build (`kiln-daemon`), pixels (`kiln-preview`).
 
-pub use client::{Client, ClientEvent};
+pub use client::{Client, ClientEvent, FrameReporter};
 pub use control::{ControlError, ask, status, stop};
 pub use kiln_build::{Digest, Part, Target, TargetState, Targets};
 pub use message::{
-    ClientMessage, FrameReport, Hello, PROTOCOL_VERSION, ProgressReport, ServerMessage, Wants, capability,
+    ClientMessage, FrameReport, Hello, PROTOCOL_VERSION, ProgressReport, Quality, ServerMessage, Wants,
+    capability,
 };
 pub use place::{LockError, ProjectLock, socket_path};
-pub use request::{Answer, Ask, ParameterWrite, Request};
+pub use request::{Answer, Ask, ERROR_MAX, ERROR_MIN, ParameterWrite, Request};
 pub use revision::{ActionTime, Revision, RevisionTable, Work};
 pub use server::{BlobSource, Server, ServerEvent};
 pub use status::{BuildStatus, ClientStatus, DaemonStatus};
+pub use token::Token;
+pub use transport::Endpoint;
 pub use wire::{Decoder, Message, WireError};
 
 mod client;
@@ -35,5 +38,6 @@ mod session;
 mod status;
 #[cfg(test)]
 mod tests;
+mod token;
 mod transport;
 mod wire;

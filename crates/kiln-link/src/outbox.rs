@@ -5,20 +5,19 @@
 
 use std::collections::VecDeque;
 use std::io::Write as _;
-use std::net::Shutdown;
-use std::os::unix::net::UnixStream;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use crate::queue::{SendQueue, Step};
 use crate::server::BlobSource;
+use crate::transport::Stream;
 use crate::wire::{Message as _, chunk_header, encode_revision};
 use crate::{Answer, ClientStatus, DaemonStatus, ProgressReport, RevisionTable, ServerMessage};
 
 pub(crate) struct Outbox {
     state: Mutex<OutboxState>,
     changed: Condvar,
-    stream: UnixStream,
+    stream: Stream,
 }
 
 #[derive(Default)]
@@ -53,6 +52,7 @@ impl OutboxState {
     pub(crate) fn client_status(&self) -> ClientStatus {
         ClientStatus {
             wants: self.queue.wants().targets.clone(),
+            qualities: self.queue.wants().qualities.clone(),
             waiting_contents: self.queue.len(),
             ..self.facts.clone()
         }
@@ -95,7 +95,7 @@ impl OutboxState {
 }
 
 impl Outbox {
-    pub(crate) fn new(stream: UnixStream) -> Outbox {
+    pub(crate) fn new(stream: Stream) -> Outbox {
         Outbox { state: Mutex::default(), changed: Condvar::new(), stream }
     }
 
@@ -111,11 +111,11 @@ impl Outbox {
     pub(crate) fn close(&self) {
         self.update(|state| state.closed = true);
         // Wakes the reading thread; the stream may be broken already.
-        let _ = self.stream.shutdown(Shutdown::Both);
+        let _ = self.stream.shutdown();
     }
 
     /// Writes, most urgent first, until the outbox closes.
-    pub(crate) fn write_all(&self, blobs: &BlobSource, mut stream: UnixStream) -> std::io::Result<()> {
+    pub(crate) fn write_all(&self, blobs: &BlobSource, mut stream: Stream) -> std::io::Result<()> {
         while let Some(turn) = self.wait() {
             match turn {
                 Turn::Message(message) => stream.write_all(&message.encode())?,
@@ -140,7 +140,7 @@ impl Outbox {
         }
     }
 
-    fn write_content(&self, blobs: &BlobSource, stream: &mut UnixStream, step: Step) -> std::io::Result<()> {
+    fn write_content(&self, blobs: &BlobSource, stream: &mut Stream, step: Step) -> std::io::Result<()> {
         match step {
             Step::Read(digest) => match blobs(&digest) {
                 Some(bytes) => self.state().queue.begin(digest, bytes),
@@ -157,7 +157,7 @@ impl Outbox {
         Ok(())
     }
 
-    fn write_missing(&self, stream: &mut UnixStream, digest: kiln_build::Digest) -> std::io::Result<()> {
+    fn write_missing(&self, stream: &mut Stream, digest: kiln_build::Digest) -> std::io::Result<()> {
         self.state().queue.forget(&digest);
         stream.write_all(&ServerMessage::Missing(digest).encode())
     }

@@ -13,7 +13,11 @@ pub const COMPONENTS_MAX: usize = 4;
 pub const PATHS_MAX: usize = 64;
 /// Bytes of a path: as many as systems take.
 pub const PATH_BYTES_MAX: usize = 4096;
-/// Characters of a shader's or parameter's name.
+/// The most exact that an environment may be asked for, as in kiln.toml.
+pub const ERROR_MIN: f64 = 1e-7;
+/// The least exact.
+pub const ERROR_MAX: f64 = 1.0;
+/// Characters of a shader's, parameter's or environment's name.
 pub const NAME_CHARS_MAX: usize = 256;
 
 /// A request; each is answered by one [`Answer`], in any order.
@@ -39,6 +43,14 @@ pub enum Ask {
     AddFiles {
         /// Absolute paths on the machine that both are on.
         paths: Vec<String>,
+    },
+    /// Bake an environment at another error than its sources say, until the client goes; the most exact that any client asks for
+    /// counts. No source is changed, and no baked file. Only for clients that follow revisions.
+    BakeAtError {
+        /// The environment's name in kiln.toml.
+        env: String,
+        /// Relative RMS error that may remain, in [`ERROR_MIN`] … [`ERROR_MAX`]; `None` ends it.
+        error: Option<f64>,
     },
     /// Something that this side does not know.
     #[serde(other)]
@@ -70,6 +82,9 @@ pub struct Answer {
     /// Groups of targets that the project has for it now or soon: `env/sky`.
     #[serde(default)]
     pub targets: Vec<String>,
+    /// Of [`Ask::BakeAtError`]: the first revision that has it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub revision: Option<u64>,
 }
 
 impl Answer {
@@ -95,7 +110,13 @@ impl Ask {
             Ask::AddFiles { paths } if paths.iter().any(|path| path.len() > PATH_BYTES_MAX) => {
                 Err(format!("a path of more than {PATH_BYTES_MAX} bytes"))
             }
-            Ask::AddFiles { .. } | Ask::Unknown => Ok(()),
+            Ask::BakeAtError { env, .. } if env.chars().count() > NAME_CHARS_MAX => {
+                Err(format!("a name of more than {NAME_CHARS_MAX} characters"))
+            }
+            Ask::BakeAtError { error: Some(error), .. } if !(ERROR_MIN..=ERROR_MAX).contains(error) => {
+                Err(format!("an error of {error}; {ERROR_MIN} to {ERROR_MAX} are allowed"))
+            }
+            Ask::AddFiles { .. } | Ask::BakeAtError { .. } | Ask::Unknown => Ok(()),
         }
     }
 }

@@ -1,27 +1,36 @@
 //! The daemon's half: any number of clients, none of which can slow the build or another client.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::{Read as _, Write as _};
+use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::os::unix::fs::PermissionsExt as _;
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use kiln_build::{Digest, TargetState};
+use kiln_diagnostic::Diagnostic;
+use tracing::{debug, trace, warn};
 
 use crate::outbox::Outbox;
 use crate::request::REQUESTS_MAX;
+use crate::transport::Stream;
 use crate::wire::{FETCH_DIGESTS_MAX, Message as _};
 use crate::{
-    Answer, BuildStatus, ClientMessage, ClientStatus, DaemonStatus, Decoder, FrameReport, Hello,
-    PROTOCOL_VERSION, ProgressReport, Request, RevisionTable, ServerMessage, Wants, capability, transport,
+    Answer, Ask, BuildStatus, ClientMessage, ClientStatus, DaemonStatus, Decoder, FrameReport, Hello,
+    PROTOCOL_VERSION, ProgressReport, Request, RevisionTable, ServerMessage, Token, Wants, capability,
+    transport,
 };
 
 /// Connections at once.
 const CONNECTIONS_MAX: usize = 64;
+/// The same by TCP, where other users may come and go: they take nobody's place at the socket.
+const TCP_CONNECTIONS_MAX: usize = 16;
+/// Who has not greeted may send so much: more than any greeting.
+const GREETING_BYTES_MAX: usize = 64 << 10;
 /// A client that takes no byte for this long is let go.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
 /// Who connects has this long to say who it is.
@@ -74,6 +83,13 @@ pub enum ServerEvent {
 pub struct Server {
     shared: Arc<Shared>,
     socket: PathBuf,
+    tcp: Option<Tcp>,
+}
+
+/// Where it listens besides.
+struct Tcp {
+    address: SocketAddr,
+    token_file: PathBuf,
 }
 
 struct Shared {
@@ -81,7 +97,7 @@ struct Shared {
     since_unix_ms: f64,
     blobs: Box<BlobSource>,
     events: Box<dyn Fn(ServerEvent) + Send + Sync>,
-    connections: AtomicUsize,
+    next_client: AtomicU64,
     clients: Mutex<BTreeMap<u64, Arc<Outbox>>>,
     latest: Mutex<Option<Arc<RevisionTable>>>,
     building: Mutex<Option<BuildStatus>>,
@@ -108,15 +124,52 @@ impl Server {
             since_unix_ms: unix_ms(),
             blobs,
             events,
-            connections: AtomicUsize::new(0),
+            next_client: AtomicU64::new(1),
             clients: Mutex::default(),
             latest: Mutex::default(),
             building: Mutex::default(),
             stopping: AtomicBool::new(false),
         });
         let accepting = shared.clone();
-        std::thread::spawn(move || accept(&listener, &accepting));
-        Ok(Server { shared, socket: socket.to_owned() })
+        std::thread::spawn(move || {
+            let streams = listener.incoming().map(|stream| {
+                let stream = stream?;
+                transport::check_peer(&stream)?;
+                Ok(Stream::Unix(stream))
+            });
+            accept(streams, CONNECTIONS_MAX, None, &accepting);
+        });
+        Ok(Server { shared, socket: socket.to_owned(), tcp: None })
+    }
+
+    /// Listens at a port of this machine too (0: any free one), for clients that cannot use the socket and show the token in the
+    /// file beside it. Returns the address and that file.
+    ///
+    /// # Errors
+    /// The address is not this machine's own, the port is taken, or the token cannot be written.
+    pub fn listen(&mut self, address: SocketAddr) -> std::io::Result<(SocketAddr, PathBuf)> {
+        if !address.ip().is_loopback() {
+            let reason = format!(
+                "{} can be reached from other machines; only 127.0.0.1 and [::1] are allowed",
+                address.ip()
+            );
+            return Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, reason));
+        }
+        let listener = TcpListener::bind(address)?;
+        let address = listener.local_addr()?;
+        let (token, token_file) = (Token::random()?, self.socket.with_extension("token"));
+        token.write(&token_file)?;
+        let accepting = self.shared.clone();
+        std::thread::spawn(move || {
+            let streams = listener.incoming().map(|stream| {
+                let stream = stream?;
+                stream.set_nodelay(true)?;
+                Ok(Stream::Tcp(stream))
+            });
+            accept(streams, TCP_CONNECTIONS_MAX, Some(&token), &accepting);
+        });
+        self.tcp = Some(Tcp { address, token_file: token_file.clone() });
+        Ok((address, token_file))
     }
 
     /// Makes `table` what every client sees; a client that has not taken the one before never gets it.
@@ -152,11 +205,11 @@ impl Server {
         self.shared.status()
     }
 
-    /// What the clients show, as far as they said: each target once.
+    /// What the clients show, as far as they said: each target once, as good as the most demanding of them wants it.
     pub fn wanted(&self) -> Wants {
-        let wants = |outbox: &Arc<Outbox>| outbox.state().queue.wants().targets.clone();
-        let targets: BTreeSet<String> = lock(&self.shared.clients).values().flat_map(wants).collect();
-        Wants { targets: targets.into_iter().collect() }
+        let wants = |outbox: &Arc<Outbox>| outbox.state().queue.wants().clone();
+        let all: Vec<Wants> = lock(&self.shared.clients).values().map(wants).collect();
+        Wants::together(&all)
     }
 
     fn tell_followers(&self, tell: impl Fn(&Outbox)) {
@@ -171,8 +224,12 @@ impl Server {
 impl Drop for Server {
     fn drop(&mut self) {
         self.shared.stopping.store(true, Ordering::SeqCst);
-        // Wakes the accepting thread; if nobody accepts any more there is nothing to wake.
+        // Wakes the accepting threads; if nobody accepts any more there is nothing to wake.
         let _ = UnixStream::connect(&self.socket);
+        if let Some(tcp) = &self.tcp {
+            let _ = TcpStream::connect(tcp.address);
+            let _ = fs::remove_file(&tcp.token_file);
+        }
         // Gone already if somebody cleaned the runtime folder. Before clients hear of the end, so that it is true.
         let _ = fs::remove_file(&self.socket);
         for outbox in lock(&self.shared.clients).values() {
@@ -221,28 +278,41 @@ fn unix_ms() -> f64 {
     SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64() * 1e3
 }
 
-fn accept(listener: &UnixListener, shared: &Arc<Shared>) {
-    let mut next_client = 1;
-    for stream in listener.incoming() {
+/// Serves whoever comes, `connections_max` at once.
+fn accept(
+    streams: impl Iterator<Item = std::io::Result<Stream>>,
+    connections_max: usize,
+    token: Option<&Token>,
+    shared: &Arc<Shared>,
+) {
+    let connections = Arc::new(AtomicUsize::new(0));
+    for stream in streams {
         if shared.stopping.load(Ordering::SeqCst) {
             return;
         }
-        let Ok(stream) = stream else { continue };
-        let full = shared.connections.load(Ordering::SeqCst) >= CONNECTIONS_MAX;
-        if full || transport::check_peer(&stream).is_err() {
+        let stream = match stream {
+            Ok(stream) => stream,
+            Err(error) => {
+                warn!(target: "wire", %error, "refused");
+                continue;
+            }
+        };
+        if connections.load(Ordering::SeqCst) >= connections_max {
+            warn!(target: "wire", "{connections_max} connections are open: one more is closed");
             continue;
         }
-        let (shared, client) = (shared.clone(), next_client);
-        next_client += 1;
-        shared.connections.fetch_add(1, Ordering::SeqCst);
+        let client = shared.next_client.fetch_add(1, Ordering::SeqCst);
+        let (shared, connections, token) = (shared.clone(), connections.clone(), token.cloned());
+        connections.fetch_add(1, Ordering::SeqCst);
         std::thread::spawn(move || {
-            let reason = serve(&shared, client, stream).unwrap_or_else(|reason| reason);
+            let reason = serve(&shared, client, stream, token.as_ref()).unwrap_or_else(|reason| reason);
             let outbox = lock(&shared.clients).remove(&client);
             let is_client = outbox.as_ref().is_none_or(|outbox| outbox.state().follows);
             if let Some(outbox) = outbox {
                 outbox.close();
             }
-            shared.connections.fetch_sub(1, Ordering::SeqCst);
+            connections.fetch_sub(1, Ordering::SeqCst);
+            debug!(target: "wire", client, reason, "gone");
             if is_client {
                 (shared.events)(ServerEvent::Gone { client, reason });
             }
@@ -251,7 +321,7 @@ fn accept(listener: &UnixListener, shared: &Arc<Shared>) {
 }
 
 /// Talks to one client until it goes; both results say why it did.
-fn serve(shared: &Arc<Shared>, client: u64, stream: UnixStream) -> Result<String, String> {
+fn serve(shared: &Arc<Shared>, client: u64, stream: Stream, token: Option<&Token>) -> Result<String, String> {
     let text = |error: std::io::Error| error.to_string();
     stream.set_write_timeout(Some(WRITE_TIMEOUT)).map_err(text)?;
     stream.set_read_timeout(Some(GREETING_TIMEOUT)).map_err(text)?;
@@ -272,11 +342,30 @@ fn serve(shared: &Arc<Shared>, client: u64, stream: UnixStream) -> Result<String
             decoder.next_message::<ClientMessage>().map_err(|error| error.to_string())?
         {
             match (message, writer.take()) {
-                (ClientMessage::Hello(hello), Some(stream)) => greet(shared, client, &outbox, stream, hello)?,
+                (ClientMessage::Hello(hello), Some(stream)) => {
+                    check_token(token, hello.token.as_ref())?;
+                    greet(shared, client, &outbox, stream, hello)?;
+                }
                 (ClientMessage::Hello(_), None) => return Err("it greeted twice".to_owned()),
                 (_, Some(_)) => return Err("it did not begin with a greeting".to_owned()),
                 (message, None) => receive(shared, client, &outbox, message)?,
             }
+        }
+        if writer.is_some() && decoder.waiting_bytes() > GREETING_BYTES_MAX {
+            return Err("it did not begin with a greeting".to_owned());
+        }
+    }
+}
+
+/// Who comes by TCP and does not show the token is told nothing, not even who is here.
+fn check_token(token: Option<&Token>, shown: Option<&Token>) -> Result<(), String> {
+    match (token, shown) {
+        (Some(token), Some(shown)) if token.is(shown) => Ok(()),
+        (None, _) => Ok(()),
+        (Some(_), shown) => {
+            let what = if shown.is_some() { "another token" } else { "no token" };
+            warn!(target: "wire", "refused a client that showed {what}");
+            Err(format!("it showed {what}"))
         }
     }
 }
@@ -285,7 +374,7 @@ fn greet(
     shared: &Arc<Shared>,
     client: u64,
     outbox: &Arc<Outbox>,
-    mut stream: UnixStream,
+    mut stream: Stream,
     hello: Hello,
 ) -> Result<(), String> {
     let answer =
@@ -296,6 +385,7 @@ fn greet(
     }
     stream.set_read_timeout(None).map_err(|error| error.to_string())?;
     let follows = hello.can(capability::REVISIONS);
+    debug!(target: "wire", client, name = hello.name, follows, "greeted");
     outbox.update(|state| {
         state.follows = follows;
         state.facts.client = client;
@@ -324,6 +414,7 @@ fn receive(shared: &Shared, client: u64, outbox: &Outbox, message: ClientMessage
     match message {
         ClientMessage::Hello(_) => {}
         ClientMessage::Fetch(digests) => {
+            trace!(target: "wire", client, contents = digests.len(), "fetches");
             outbox.update(|state| state.queue.fetch(digests));
             if outbox.state().queue.len() > FETCH_DIGESTS_MAX {
                 return Err("it asked for more than a revision holds".to_owned());
@@ -350,7 +441,18 @@ fn receive(shared: &Shared, client: u64, outbox: &Outbox, message: ClientMessage
             if state.open_requests > REQUESTS_MAX {
                 return Err(format!("it asked for more than {REQUESTS_MAX} things at once"));
             }
+            let lasts = state.follows || !matches!(request.ask, Ask::BakeAtError { .. });
             drop(state);
+            if !lasts {
+                // It would end with the answer: nobody would see it.
+                let fault = Diagnostic::error(
+                    "an error is kept for as long as a client follows revisions, and this one does not",
+                );
+                let answer =
+                    Answer::refused(request.id, fault.with_help("greet with the capability `revisions`"));
+                outbox.update(|state| state.answers.push_back(answer));
+                return Ok(());
+            }
             (shared.events)(ServerEvent::Asked { client, request });
         }
     }

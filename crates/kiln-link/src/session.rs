@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-use kiln_build::Digest;
+use kiln_build::{Digest, DigestBuilder};
 
 use crate::{
     ClientEvent, ClientMessage, Hello, PROTOCOL_VERSION, Revision, RevisionTable, ServerMessage, capability,
@@ -15,11 +15,61 @@ use crate::{
 pub(crate) struct ClientSession {
     greeted: bool,
     contents: HashMap<Digest, Arc<[u8]>>,
-    arriving: HashMap<Digest, Vec<u8>>,
+    arriving: HashMap<Digest, Arriving>,
     requested: HashSet<Digest>,
     pending: Option<RevisionTable>,
     /// Contents of the newest whole revision.
     delivered: HashSet<Digest>,
+}
+
+/// A content longer than this is not given its room before it comes: a liar would have it for a few bytes.
+const ROOM_BYTES_MAX: u64 = 256 << 20;
+
+/// A content of which a part is here, and hashed while it was at hand.
+struct Arriving {
+    room: Room,
+    length: usize,
+    hasher: DigestBuilder,
+}
+
+enum Room {
+    /// All of it, so that nothing is copied twice.
+    Whole(Arc<[u8]>),
+    Growing(Vec<u8>),
+}
+
+impl Arriving {
+    fn new(total: u64) -> Arriving {
+        let room = match usize::try_from(total) {
+            Ok(bytes) if total <= ROOM_BYTES_MAX => Room::Whole(std::iter::repeat_n(0, bytes).collect()),
+            _ => Room::Growing(Vec::new()),
+        };
+        Arriving { room, length: 0, hasher: DigestBuilder::default() }
+    }
+
+    /// Whether there is room for it.
+    fn push(&mut self, bytes: &[u8]) -> bool {
+        match &mut self.room {
+            Room::Whole(room) => {
+                let room =
+                    Arc::get_mut(room).and_then(|room| room.get_mut(self.length..)?.get_mut(..bytes.len()));
+                let Some(room) = room else { return false };
+                room.copy_from_slice(bytes);
+            }
+            Room::Growing(room) => room.extend_from_slice(bytes),
+        }
+        self.length += bytes.len();
+        self.hasher.update(bytes);
+        true
+    }
+
+    fn finish(self) -> (Digest, Arc<[u8]>) {
+        let bytes = match self.room {
+            Room::Whole(room) => room,
+            Room::Growing(room) => room.into(),
+        };
+        (self.hasher.finish(), bytes)
+    }
 }
 
 /// What to do after a message.
@@ -40,6 +90,11 @@ impl ClientSession {
         self.arriving.clear();
         self.requested.clear();
         self.pending = None;
+    }
+
+    /// Whether the daemon of this connection said who it is.
+    pub(crate) fn is_greeted(&self) -> bool {
+        self.greeted
     }
 
     /// Takes one message.
@@ -108,24 +163,27 @@ impl ClientSession {
         if !self.requested.contains(&digest) {
             return Err(format!("the daemon sent content {} without being asked", digest.short()));
         }
-        let content = self.arriving.entry(digest).or_default();
-        if content.len() as u64 != offset {
+        let content = self.arriving.entry(digest).or_insert_with(|| Arriving::new(total));
+        if content.length as u64 != offset {
             return Err(format!(
                 "a chunk of {} begins at {offset} instead of {}",
                 digest.short(),
-                content.len()
+                content.length
             ));
         }
-        content.extend_from_slice(bytes);
-        if (content.len() as u64) < total {
+        if !content.push(bytes) {
+            return Err(format!("content {} is longer than its first chunk said", digest.short()));
+        }
+        if (content.length as u64) < total {
             return Ok(());
         }
-        let content = self.arriving.remove(&digest).unwrap_or_default();
+        let Some(content) = self.arriving.remove(&digest) else { return Ok(()) };
         self.requested.remove(&digest);
-        if Digest::of(&content) != digest {
+        let (arrived, content) = content.finish();
+        if arrived != digest {
             return Err(format!("content {} arrived with other bytes", digest.short()));
         }
-        self.contents.insert(digest, content.into());
+        self.contents.insert(digest, content);
         Ok(())
     }
 

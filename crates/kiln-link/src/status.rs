@@ -1,9 +1,11 @@
 //! How a daemon is: what `kiln status` prints.
 
+use std::collections::BTreeMap;
+
 use kiln_diagnostic::Diagnostic;
 use serde::{Deserialize, Serialize};
 
-use crate::ProgressReport;
+use crate::{ProgressReport, Quality};
 
 /// A daemon at one moment. Times are Unix time in milliseconds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -53,6 +55,9 @@ pub struct ClientStatus {
     pub since_unix_ms: f64,
     /// What it shows, as far as it said.
     pub wants: Vec<String>,
+    /// How good those must be that need not be final.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub qualities: BTreeMap<String, Quality>,
     /// The newest revision whose table was written to it; 0 before the first.
     pub told_revision: u64,
     /// The newest revision that it drew; 0 if it reported none.

@@ -104,6 +104,11 @@ impl Decoder {
         self.buffer.extend_from_slice(bytes);
     }
 
+    /// Bytes of a message that is not whole yet.
+    pub fn waiting_bytes(&self) -> usize {
+        self.buffer.len() - self.start
+    }
+
     /// The next whole message, or `None` until more bytes come.
     pub fn next_message<M: Message>(&mut self) -> Result<Option<M>, WireError> {
         let rest = &self.buffer[self.start..];
@@ -166,6 +171,9 @@ fn parse_wants(kind: u8, payload: &[u8]) -> Result<Wants, WireError> {
     let wants: Wants = parse(kind, payload)?;
     if wants.targets.len() > WANTS_MAX {
         return Err(malformed(kind, format!("{} targets; {WANTS_MAX} are allowed", wants.targets.len())));
+    }
+    if wants.qualities.keys().any(|name| !wants.targets.contains(name)) {
+        return Err(malformed(kind, "a quality of a target that is not wanted".to_owned()));
     }
     if wants.targets.iter().any(|name| name.chars().count() > NAME_CHARS_MAX) {
         return Err(malformed(kind, format!("a target's name of more than {NAME_CHARS_MAX} characters")));

@@ -34,15 +34,19 @@ pub(crate) struct FrameWatcher {
 
 impl FrameWatcher {
     /// Starts the thread; `wake` is called whenever [`FrameWatcher::finished`] has something new.
-    pub fn spawn(reports: Sender<FrameReport>, wake: impl Fn() + Send + 'static) -> anyhow::Result<Self> {
+    pub fn spawn(
+        report: impl Fn(FrameReport) + Send + 'static,
+        wake: impl Fn() + Send + 'static,
+    ) -> anyhow::Result<Self> {
         let (frames, watched) = channel::<Watched>();
         let (sender, finished) = channel();
         let thread = std::thread::Builder::new().name("frames".into());
         let watch = move || {
             for frame in watched {
                 let frame = await_frame(frame);
-                // Both ends belong to the window: when they are gone, so is the need.
-                if reports.send(frame.report.clone()).is_err() || sender.send(frame).is_err() {
+                report(frame.report.clone());
+                // The other end belongs to the window: when it is gone, so is the need.
+                if sender.send(frame).is_err() {
                     return;
                 }
                 wake();

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context as _, bail, ensure};
 use kiln_diagnostic::Diagnostic;
 use kiln_gpu::Gpu;
-use kiln_link::{Client, ClientEvent, FrameReport, Revision};
+use kiln_link::{Client, ClientEvent, Endpoint, FrameReport, Revision};
 use serde::Serialize;
 
 use crate::assignment::Assignment;
@@ -18,8 +18,8 @@ use crate::worker::unix_ms;
 /// What to render without a window.
 #[derive(Clone, Debug)]
 pub struct HeadlessOptions {
-    /// Socket of the project's daemon.
-    pub socket: PathBuf,
+    /// Where the project's daemon is.
+    pub daemon: Endpoint,
     /// Folder for `frame_0001.png` …, made if it is not there.
     pub out: PathBuf,
     /// How many frames.
@@ -75,7 +75,7 @@ pub fn run_headless(options: &HeadlessOptions) -> anyhow::Result<HeadlessReport>
     let mut viewer = HeadlessViewer::new(gpu, options.size);
     viewer.view = options.view.clone();
     viewer.select(options.selection.clone());
-    let client = Client::connect(options.socket.clone(), "preview, headless");
+    let client = Client::connect(options.daemon.clone(), "preview, headless");
     client.want(options.selection.targets(&options.view));
     let revision = wait_for_revision(&client, options)?;
     let received_unix_ms = unix_ms();

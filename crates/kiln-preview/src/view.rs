@@ -45,7 +45,7 @@ pub struct AnimationTime {
 
 impl Selection {
     /// The targets, or groups of them, that it names; with those that a view of it needs besides.
-    pub(crate) fn targets(&self, view: &View) -> Vec<String> {
+    pub fn targets(&self, view: &View) -> Vec<String> {
         let scene = self.scene.iter().map(|name| format!("scene/{name}"));
         let env = self.env.iter().map(|name| format!("env/{name}"));
         scene.chain(env).chain(view.inspects().then(|| GROUP.to_owned())).collect()

@@ -7,7 +7,7 @@ use anyhow::{Context as _, anyhow};
 use eframe::egui_wgpu::{WgpuSetup, WgpuSetupCreateNew};
 use egui::Ui;
 use kiln_gpu::Gpu;
-use kiln_link::{ClientEvent, Revision};
+use kiln_link::{ClientEvent, Endpoint, Revision};
 
 use crate::connection::{Connection, Heard};
 use crate::frame_watcher::{Finished, FrameWatcher};
@@ -23,8 +23,8 @@ use crate::worker::{Request, Worker};
 /// What to show in a window.
 #[derive(Clone, Debug)]
 pub struct WindowOptions {
-    /// Socket of the project's daemon.
-    pub socket: PathBuf,
+    /// Where the project's daemon is.
+    pub daemon: Endpoint,
     /// Title of the window.
     pub title: String,
     /// Width and height of the window in points, where nothing is remembered.
@@ -123,11 +123,10 @@ impl Window {
             let context = context.clone();
             move || context.request_repaint()
         };
-        let connection =
-            Connection::open(options.socket, waker(&context.egui_ctx)).context("starting a thread")?;
+        let connection = Connection::open(options.daemon, waker(&context.egui_ctx));
         let worker = Worker::spawn(gpu.clone(), waker(&context.egui_ctx)).context("starting a thread")?;
-        let reports = connection.reports();
-        let watcher = FrameWatcher::spawn(reports, waker(&context.egui_ctx))?;
+        let reporter = connection.reporter();
+        let watcher = FrameWatcher::spawn(move |report| reporter.report(report), waker(&context.egui_ctx))?;
         let panels = PanelState::new(gpu.description(), options.selection.clone(), options.view);
         Ok(Window {
             picture: LivePicture::new(

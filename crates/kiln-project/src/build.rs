@@ -70,7 +70,7 @@ fn build_in_order(
             changed = None;
         }
         let start = Instant::now();
-        let mut plan = plan_with(engine, changed, wishes)?;
+        let mut plan = plan_with(engine, changed, wishes.clone())?;
         let plan_ms = start.elapsed().as_secs_f64() * 1e3;
         let Some((report, run_ms)) = run(&mut plan, plan_ms)? else { return Ok(None) };
         let (targets, diagnostics) = plan.resolve(engine, &report);

@@ -147,10 +147,13 @@ pub(crate) fn no_content(what: &str, unreadable: Option<&str>) -> Diagnostic {
 }
 
 /// What somebody wants besides what the project asks for. It is in no manifest and no folder of baked files.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Wishes {
     /// Variants of material shaders that show what a pixel is made of: the targets `inspect/SHADER/VARIANT`.
     pub inspect: bool,
+    /// Environments to bake at another relative RMS error than kiln.toml says; names that the project does not have are
+    /// passed over.
+    pub errors: BTreeMap<String, f64>,
 }
 
 impl Wishes {
@@ -159,7 +162,12 @@ impl Wishes {
 
     /// The wishes among the names of targets that somebody wants.
     pub fn among<'a>(mut names: impl Iterator<Item = &'a String>) -> Wishes {
-        Wishes { inspect: names.any(|name| name == Wishes::INSPECT) }
+        Wishes { inspect: names.any(|name| name == Wishes::INSPECT), ..Wishes::default() }
+    }
+
+    /// Whether what kiln.toml asks for is made otherwise: such maps go into no folder of baked files.
+    pub fn change_maps(&self) -> bool {
+        !self.errors.is_empty()
     }
 
     /// Whether a target belongs to what is there by wish alone.
@@ -195,6 +203,9 @@ pub fn plan_with(engine: &Engine, changed: Option<&[String]>, wishes: Wishes) ->
                 .with_help("`kiln bake` chooses, and writes kiln.lock"),
         );
     }
+    for (name, env) in &mut project.envs {
+        env.error = wishes.errors.get(name).copied().unwrap_or(env.error);
+    }
     if project.envs.values().any(|env| env.law != RoughnessLaw::Linear) {
         let message = "the preview reads specular levels as linear in roughness; `law` is for engines";
         diagnostics.push(Diagnostic::note(message).in_file(PROJECT_FILE));
@@ -219,7 +230,7 @@ pub(crate) fn plan_project(
     }
     let envs = env_demands(&project, &scenes);
     for (name, config) in &project.shaders {
-        shader::plan_shader(&mut planner, engine, name, config, &variants, wishes)?;
+        shader::plan_shader(&mut planner, engine, name, config, &variants, wishes.inspect)?;
     }
     for (name, config) in &project.envs {
         environment::plan_environment(&mut planner, engine, name, config, &envs[name]);

@@ -47,7 +47,7 @@ pub(crate) fn plan_shader(
     name: &str,
     config: &ShaderConfig,
     variants: &Variants,
-    wishes: Wishes,
+    is_inspected: bool,
 ) -> Result<(), Error> {
     let program = &config.program;
     // A scan is known by one file; what else decides what it looks at is part of its kind.
@@ -94,7 +94,7 @@ pub(crate) fn plan_shader(
         parts.extend(textures.iter().cloned());
         planner.target(format!("shader/{name}/{variant}"), "shader", meta.clone(), parts);
         // A shader whose conditions do not know it would look the same.
-        if wishes.inspect && config.role == Role::Material && known.contains(Wishes::INSPECT) {
+        if is_inspected && config.role == Role::Material && known.contains(Wishes::INSPECT) {
             let features = asked.iter().cloned().chain([Wishes::INSPECT.to_owned()]);
             let features: BTreeSet<String> = features.filter(|feature| known.contains(feature)).collect();
             let compile = *compiled.entry(features).or_insert_with_key(|features| {

@@ -382,6 +382,13 @@ pub(crate) struct WatchArgs {
     /// Also look at the files themselves this often, as 500ms or 2s: for file systems that tell of no change (a network's)
     #[arg(long, value_name = "TIME", value_parser = parse_poll)]
     pub(crate) poll: Option<std::time::Duration>,
+    /// Also write what happens inside to standard error: off, error, warn, info, debug or trace, for all or for one of
+    /// watch, build, wire and request, as info,wire=debug [default: $KILN_LOG]
+    #[arg(long, value_name = "[TARGET=]LEVEL,…")]
+    pub(crate) log: Option<crate::log::LogFilter>,
+    /// Listen at this address of this machine too, as 127.0.0.1:7788 (port 0: any free one); clients show the token that is said
+    #[arg(long, value_name = "HOST:PORT", value_parser = parse_loopback)]
+    pub(crate) listen: Option<std::net::SocketAddr>,
 }
 
 #[derive(Debug, ClapArgs)]
@@ -410,6 +417,12 @@ pub(crate) struct PreviewArgs {
     /// Write PNG files instead of opening a window
     #[arg(long)]
     pub(crate) headless: bool,
+    /// Where the daemon listens, as `kiln watch --listen` says it [default: the project's socket]
+    #[arg(long, value_name = "HOST:PORT", value_parser = parse_address, requires = "token_file")]
+    pub(crate) connect: Option<std::net::SocketAddr>,
+    /// The file with the token that this daemon wants to see
+    #[arg(long, value_name = "FILE", requires = "connect")]
+    pub(crate) token_file: Option<PathBuf>,
     /// Number of frames to write
     #[arg(long, default_value_t = 1, requires = "headless")]
     pub(crate) frames: usize,
@@ -509,6 +522,20 @@ fn parse_poll(text: &str) -> Result<std::time::Duration, String> {
     };
     let ms = number.parse::<u64>().ok().and_then(|number| number.checked_mul(unit_ms)).ok_or_else(wrong)?;
     (50..=3_600_000).contains(&ms).then(|| std::time::Duration::from_millis(ms)).ok_or_else(wrong)
+}
+
+/// An address that no other machine reaches.
+fn parse_loopback(text: &str) -> Result<std::net::SocketAddr, String> {
+    let address = parse_address(text)?;
+    let why = "can be reached from other machines; only 127.0.0.1 and [::1] are allowed: forward the port with `ssh -L`";
+    if address.ip().is_loopback() { Ok(address) } else { Err(format!("{} {why}", address.ip())) }
+}
+
+/// An address and a port.
+fn parse_address(text: &str) -> Result<std::net::SocketAddr, String> {
+    let text =
+        text.strip_prefix("localhost:").map_or_else(|| text.to_owned(), |port| format!("127.0.0.1:{port}"));
+    text.parse().map_err(|_| format!("`{text}` is no address with a port; write it as 127.0.0.1:7788"))
 }
 
 /// A number of frames a second.

@@ -16,10 +16,12 @@ use clap::Parser as _;
 mod args;
 mod ci;
 mod commands;
+mod log;
 mod out;
 mod picture;
 mod place;
 mod report;
+mod screen;
 mod sheet;
 
 /// The input is wrong, and the diagnostics have said how.

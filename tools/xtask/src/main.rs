@@ -40,6 +40,7 @@ cargo xtask bench bake […]        error and cost of prefiltered maps beside a 
 cargo xtask faults [COUNT]        kill COUNT processes at random moments and flip COUNT bits (default 1000)
 cargo xtask fuzz [COUNT] [SEED]   decode COUNT damaged copies of each image file of the tests (default 100000)
 cargo xtask bench loop [EDITS]    every stage from a save to its picture, p50, p95 and p99 (default 200)
+cargo xtask bench wire            a revision of 64 MiB over the socket, beside a plain copy over a socket and SHA-256 alone
 cargo xtask fuzz shaders [COUNT] [SEED]
                                   compile COUNT damaged, COUNT random WGSL and COUNT random GLSL shaders in the worker (default 10000)
 cargo xtask fuzz wire [COUNT] [SEED]
@@ -63,6 +64,7 @@ fn main() -> ExitCode {
             Ok(edits) => bench_loop::run(edits),
             Err(_) => Err(format!("`{edits}` is no number of edits")),
         },
+        ["bench", "wire"] => test::wire(),
         ["bench", "demand"] => bench_demand::run(),
         ["bench", "render"] => bench_render::run(8),
         ["bench", "render", frames] => match frames.parse() {

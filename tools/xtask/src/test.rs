@@ -92,6 +92,14 @@ pub(crate) fn fuzz_wire(count: Option<&str>, seed: Option<&str>) -> Result<(), S
     step("fuzz wire", &mut tests)
 }
 
+/// How fast a revision of 64 MiB crosses the socket, beside a plain copy and the hash alone.
+pub(crate) fn wire() -> Result<(), String> {
+    let arguments =
+        ["test", "--release", "-p", "kiln-link", "--lib", "--", "tests::throughput::", "--nocapture"];
+    let mut tests = cargo(&arguments);
+    step("bench wire", tests.env("KILN_WIRE_MIB", "64"))
+}
+
 /// Swaps `count` shaders, lights and materials under a renderer, and prints what memory that takes.
 pub(crate) fn swaps(count: &str) -> Result<(), String> {
     let arguments =

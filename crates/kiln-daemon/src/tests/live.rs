@@ -47,6 +47,7 @@ impl Running {
             cache_bytes_max: 1 << 30,
             write_outputs: false,
             poll,
+            listen: None,
         };
         let daemon = Daemon::start(&options).unwrap();
         let socket = daemon.socket().to_owned();
@@ -63,12 +64,12 @@ impl Running {
         self.folder.path().join(name)
     }
 
-    fn notice(&self) -> Notice {
+    pub(super) fn notice(&self) -> Notice {
         self.notices.recv_timeout(LIMIT).expect("a notice in time")
     }
 
     /// Asks until the daemon is as wanted.
-    fn wait_until(&self, is_wanted: impl Fn(&kiln_link::DaemonStatus) -> bool) {
+    pub(super) fn wait_until(&self, is_wanted: impl Fn(&kiln_link::DaemonStatus) -> bool) {
         let deadline = std::time::Instant::now() + LIMIT;
         while !is_wanted(&kiln_link::status(&self.socket, LIMIT).unwrap()) {
             assert!(std::time::Instant::now() < deadline);

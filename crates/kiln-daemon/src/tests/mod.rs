@@ -1,5 +1,6 @@
 //! Watching by itself, and whole daemons on small projects.
 
+mod accuracy;
 mod live;
 mod requests;
 

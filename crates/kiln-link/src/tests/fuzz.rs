@@ -92,7 +92,7 @@ fn write_request(id: u64) -> ClientMessage {
 fn client_talk() -> Vec<u8> {
     let messages = [
         ClientMessage::Hello(Hello::new("fuzz", &[capability::REVISIONS])),
-        ClientMessage::Wants(Wants { targets: vec!["env/a".into()] }),
+        ClientMessage::Wants(Wants { targets: vec!["env/a".into()], ..Wants::default() }),
         ClientMessage::Fetch(CONTENTS.iter().map(|bytes| Digest::of(bytes)).collect()),
         ClientMessage::Ping(7),
         ClientMessage::Pong(1),
@@ -337,7 +337,7 @@ fn floods_and_oversize_messages_end_their_connection_alone() {
     let too_long = u32::try_from(CLIENT_FRAME_BYTES_MAX + 1).unwrap().to_le_bytes().to_vec();
     let many_digests: Vec<Digest> =
         (0..=FETCH_DIGESTS_MAX as u32).map(|index| Digest::of(&index.to_le_bytes())).collect();
-    let wants = |targets| ClientMessage::Wants(Wants { targets }).encode();
+    let wants = |targets| ClientMessage::Wants(Wants { targets, ..Wants::default() }).encode();
     let hostile: [Vec<u8>; 4] = [
         too_long,
         ClientMessage::Fetch(many_digests).encode(),

@@ -8,6 +8,8 @@ mod python;
 mod queue;
 mod requests;
 mod simulation;
+mod tcp;
+mod throughput;
 
 use std::collections::{BTreeMap, HashMap};
 use std::io::{Read as _, Write as _};

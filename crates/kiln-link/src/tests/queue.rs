@@ -7,8 +7,8 @@ use kiln_build::Digest;
 use serde_json::json;
 
 use crate::queue::{SendQueue, Step};
-use crate::wire::CHUNK_BYTES;
-use crate::{Part, RevisionTable, Target, TargetState, Wants};
+use crate::wire::{CHUNK_BYTES, Message as _};
+use crate::{ClientMessage, Decoder, Part, Quality, RevisionTable, Target, TargetState, Wants};
 
 fn target(kind: &str, contents: &[Vec<u8>]) -> Target {
     let part =
@@ -104,7 +104,7 @@ fn shaders_come_first_then_what_is_shown_then_coarse_levels() {
         ("env/b/irradiance", "cube", content(300, 3)),
         ("shader/pbr/base", "shader", content(9000, 4)),
     ]);
-    bench.queue.set_wants(Wants { targets: vec!["env/b".into()] });
+    bench.queue.set_wants(Wants { targets: vec!["env/b".into()], ..Wants::default() });
     bench.fetch(&[0, 1, 2, 3]);
     assert_eq!(bench.order(), [3, 2, 1, 0]);
 }
@@ -114,13 +114,13 @@ fn new_wants_reorder_what_waits() {
     let mut bench =
         Bench::new(&[("env/a/sky", "cube", content(100, 1)), ("env/b/sky", "cube", content(400, 2))]);
     bench.fetch(&[0, 1]);
-    bench.queue.set_wants(Wants { targets: vec!["env/b".into()] });
+    bench.queue.set_wants(Wants { targets: vec!["env/b".into()], ..Wants::default() });
     assert_eq!(bench.order(), [1, 0]);
 }
 
 #[test]
 fn group_of_wanted_targets_ends_at_a_slash() {
-    let wants = Wants { targets: vec!["env/sky".into()] };
+    let wants = Wants { targets: vec!["env/sky".into()], ..Wants::default() };
     assert!(wants.include("env/sky") && wants.include("env/sky/specular"));
     assert!(!wants.include("env/skyline/specular") && !wants.include("env"));
 }
@@ -177,4 +177,25 @@ fn content_that_a_newer_table_names_again_is_not_said_to_be_missing() {
     assert_eq!(queue.next(), Some(Step::Missing(Digest::of(b"back"))), "this table does without it");
     queue.tell(table(2, b"back"));
     assert_eq!(queue.next(), Some(Step::Read(Digest::of(b"back"))));
+}
+
+#[test]
+fn most_demanding_client_decides_how_good_a_target_must_be() {
+    let wants = |pairs: &[(&str, Quality)]| Wants {
+        targets: pairs.iter().map(|(name, _)| (*name).to_owned()).collect(),
+        qualities: pairs.iter().map(|(name, quality)| ((*name).to_owned(), *quality)).collect(),
+    };
+    let one = wants(&[("env/sky", Quality::Draft), ("env/dusk", Quality::Preview)]);
+    let other = wants(&[("env/sky", Quality::Preview), ("env/dusk", Quality::Final)]);
+    let both = Wants::together([&one, &other]);
+    assert_eq!(both.quality_of("env/sky/specular"), Some(Quality::Preview));
+    assert_eq!(both.quality_of("env/dusk"), Some(Quality::Final));
+    assert_eq!(both.quality_of("env/skyline"), None);
+    assert!(!both.qualities.contains_key("env/dusk"), "what is final goes without saying");
+    let unknown: Wants = serde_json::from_str(r#"{"targets":["a"],"qualities":{"a":"perfect"}}"#).unwrap();
+    assert_eq!(unknown.quality_of("a"), Some(Quality::Final));
+    let stray = ClientMessage::Wants(Wants { targets: Vec::new(), ..one }).encode();
+    let mut decoder = Decoder::default();
+    decoder.push(&stray);
+    assert!(decoder.next_message::<ClientMessage>().is_err(), "a quality of what is not wanted");
 }

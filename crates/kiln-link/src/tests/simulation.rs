@@ -173,7 +173,7 @@ impl Simulation {
                 let lost = Digest::of(&self.contents[self.random.below(self.contents.len())]);
                 self.store.remove(&lost);
             }
-            4 => self.daemon.queue.set_wants(Wants { targets: vec!["env/a".into()] }),
+            4 => self.daemon.queue.set_wants(Wants { targets: vec!["env/a".into()], ..Wants::default() }),
             5..=16 => _ = self.write(),
             17..=28 => _ = self.hear(),
             _ => _ = self.listen(),

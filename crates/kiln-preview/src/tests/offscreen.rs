@@ -59,7 +59,8 @@ impl Offscreen {
             view_formats: &[],
         });
         let (sender, reports) = channel();
-        let watcher = FrameWatcher::spawn(sender, || ()).expect("a thread starts");
+        let watcher =
+            FrameWatcher::spawn(move |report| drop(sender.send(report)), || ()).expect("a thread starts");
         let picture = LivePicture::new(gpu.clone(), render_state.clone(), watcher, folder, &context);
         let mut panels = PanelState::new(gpu.description(), Selection::default(), View::default());
         panels.connection = Connection::Connected;

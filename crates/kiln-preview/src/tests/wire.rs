@@ -14,7 +14,7 @@ const PATIENCE: Duration = Duration::from_secs(60);
 
 fn options(folder: &std::path::Path) -> HeadlessOptions {
     HeadlessOptions {
-        socket: folder.join("socket"),
+        daemon: folder.join("socket").into(),
         out: folder.join("frames"),
         frames: 2,
         size: [64, 36],
@@ -42,8 +42,8 @@ fn headless_run_writes_frames_and_reports_the_first_to_the_daemon() {
         parts.find(|part| part.digest == *digest).map(|part| Arc::clone(blobs.bytes(part)))
     };
     let event = move |event| drop(sender.send(event));
-    let server =
-        Server::bind(&options.socket, "test", Box::new(source), Box::new(event)).expect("the socket is free");
+    let server = Server::bind(&folder.path().join("socket"), "test", Box::new(source), Box::new(event))
+        .expect("the socket is free");
     server.publish(Arc::new(revision.table.clone()));
     let report = run_headless(&options).expect("two frames");
     assert_eq!((report.revision, report.files.len()), (1, 2));

@@ -1,4 +1,6 @@
-//! What is made for somebody who looks into frames, and for nobody else.
+//! What is made for somebody who looks into frames or turns an error up and down, and for nobody else.
+
+use std::collections::BTreeMap;
 
 use super::*;
 
@@ -21,7 +23,7 @@ impl Place {
     }
 }
 
-const INSPECT: Wishes = Wishes { inspect: true };
+const INSPECT: Wishes = Wishes { inspect: true, errors: BTreeMap::new() };
 
 fn extras(built: &Built) -> Vec<&str> {
     built.targets.keys().map(String::as_str).filter(|name| Wishes::is_extra(name)).collect()
@@ -73,4 +75,22 @@ fn shader_without_the_feature_has_no_such_variants() {
     let built = place.build_with(INSPECT);
     assert_eq!(extras(&built), ["inspect/shaders"]);
     assert_eq!(built.targets["inspect/shaders"].meta["shaders"], serde_json::json!([]));
+}
+
+#[test]
+fn environment_is_baked_at_another_error_by_wish_and_as_kiln_toml_says_without() {
+    let place = Place::new();
+    let plain = place.build();
+    let error = 0.05;
+    let wishes =
+        |name: &str| Wishes { errors: BTreeMap::from([(name.to_owned(), error)]), ..Wishes::default() };
+    assert!(wishes("room").change_maps() && !INSPECT.change_maps());
+    let coarse = place.build_with(wishes("room"));
+    assert_eq!(coarse.plan.project.envs["room"].error, error);
+    assert!(ran(&coarse).iter().any(|name| name.contains("env/room")), "{:?}", ran(&coarse));
+    let again = place.build();
+    assert!(ran(&again).is_empty(), "the cache has what kiln.toml asks for: {:?}", ran(&again));
+    assert_eq!(again.targets, plain.targets);
+    let nobody = place.build_with(wishes("dusk"));
+    assert!(ran(&nobody).is_empty(), "no environment has this name: {:?}", ran(&nobody));
 }

@@ -83,6 +83,7 @@ impl Demo {
             cache_bytes_max: place::cache_bytes_max()?,
             write_outputs: true,
             poll: None,
+            listen: None,
         };
         let daemon = Daemon::start(&options).context("starting the daemon")?;
         let (stop, socket) = (daemon.stop_handle(), daemon.socket().to_owned());

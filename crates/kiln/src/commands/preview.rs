@@ -1,11 +1,12 @@
 //! `kiln preview`: the window, or pictures without one.
 
 use std::process::ExitCode;
+use std::sync::mpsc::channel;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use anyhow::Context as _;
 use kiln_gpu::Gpu;
-use kiln_link::{Client, ClientEvent, FrameReport};
+use kiln_link::{Client, ClientEvent, Endpoint, FrameReport, Token};
 use kiln_preview::HeadlessViewer;
 use kiln_preview::{
     HeadlessOptions, RefusedParameter, Selection, View, WindowOptions, run_headless, run_window,
@@ -24,12 +25,12 @@ const PICTURES: &str = "frames";
 pub(crate) fn run(args: &PreviewArgs) -> anyhow::Result<ExitCode> {
     let selection = Selection { scene: args.scene.clone(), env: args.env.clone(), ..Selection::default() };
     let view = View { exposure_ev: args.exposure, ..View::default() };
-    let socket = place::socket_of(&args.dir)?;
+    let daemon = endpoint_of(args)?;
     if args.follow {
-        return follow(args, socket, selection, view);
+        return follow(args, daemon, selection, view);
     }
     if args.headless {
-        return headless(args, socket, selection, view);
+        return headless(args, daemon, selection, view);
     }
     if !place::has_display() {
         eprintln!(
@@ -38,30 +39,44 @@ pub(crate) fn run(args: &PreviewArgs) -> anyhow::Result<ExitCode> {
         );
         return Ok(ExitCode::from(INPUT_IS_WRONG));
     }
-    let folder = place::project_folder(&args.dir)?;
-    let name = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let state = if args.fresh { None } else { place::window_state_file(&folder) };
+    // A daemon that is reached by its address may watch a folder that is not here.
+    let folder = args.connect.is_none().then(|| place::project_folder(&args.dir)).transpose()?;
+    let name = match (&folder, args.connect) {
+        (_, Some(address)) => address.to_string(),
+        (Some(folder), None) => folder.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        (None, None) => String::new(),
+    };
+    let state = folder.as_deref().filter(|_| !args.fresh).and_then(place::window_state_file);
     run_window(WindowOptions {
-        socket,
+        daemon,
         title: format!("{name} — Kiln"),
         size: WINDOW_POINTS,
         selection,
         view,
-        pictures: args.out.clone().unwrap_or_else(|| folder.join(PICTURES)),
+        pictures: args.out.clone().unwrap_or_else(|| folder.unwrap_or_default().join(PICTURES)),
         state,
         lose_device_after_frames: args.lose_device_after_frames,
     })?;
     Ok(ExitCode::SUCCESS)
 }
 
+/// Where the daemon is: at the address that is given, else at the project's socket.
+fn endpoint_of(args: &PreviewArgs) -> anyhow::Result<Endpoint> {
+    let (Some(address), Some(file)) = (args.connect, &args.token_file) else {
+        return Ok(place::socket_of(&args.dir)?.into());
+    };
+    let wrong = |error| place::WrongInput(format!("the token in {}: {error}", file.display()));
+    Ok(Endpoint::Tcp { address, token: Token::read(file).map_err(wrong)? })
+}
+
 fn headless(
     args: &PreviewArgs,
-    socket: std::path::PathBuf,
+    daemon: Endpoint,
     selection: Selection,
     view: View,
 ) -> anyhow::Result<ExitCode> {
     let done = run_headless(&HeadlessOptions {
-        socket,
+        daemon,
         out: args.out.clone().unwrap_or_else(|| PICTURES.into()),
         frames: args.frames,
         size: args.size,
@@ -92,7 +107,7 @@ fn headless(
 /// Writes a picture of every revision until the process is ended.
 fn follow(
     args: &PreviewArgs,
-    socket: std::path::PathBuf,
+    daemon: Endpoint,
     selection: Selection,
     view: View,
 ) -> anyhow::Result<ExitCode> {
@@ -100,15 +115,19 @@ fn follow(
     std::fs::create_dir_all(&out).with_context(|| format!("making the folder {}", out.display()))?;
     let mut viewer = HeadlessViewer::new(Gpu::headless()?, args.size);
     viewer.view = view;
+    let wants = selection.targets(&viewer.view);
     viewer.select(selection);
-    let client = Client::connect(socket, "preview, following");
-    while let Ok(event) = client.events().recv() {
+    // What comes while a picture is written has come then, and not when it is looked at.
+    let (sender, heard) = channel();
+    let tell = move |event| sender.send((unix_ms(), event)).is_ok();
+    let client = Client::connect_and_tell(daemon, "preview, following", tell);
+    client.want(wants);
+    while let Ok((received_unix_ms, event)) = heard.recv() {
         match event {
             ClientEvent::Connected { project } => say!("connected to {project}"),
             ClientEvent::Disconnected { reason } => say!("waiting: {reason}"),
             ClientEvent::Progress { .. } | ClientEvent::Answer(_) => {}
             ClientEvent::Revision(revision) => {
-                let received_unix_ms = unix_ms();
                 let applied = viewer.apply(&revision);
                 let ready_unix_ms = unix_ms();
                 viewer.draw()?;

@@ -65,7 +65,8 @@ fn build(args: &RenderArgs) -> anyhow::Result<Revision> {
     let progress = show_progress(&bar);
     let cancel = AtomicBool::new(false);
     let options = place::run_options(&args.build, true, &cancel, &progress);
-    let wishes = Wishes { inspect: !args.inspect.channel.is_empty() || args.inspect.mark_faults.is_some() };
+    let inspect = !args.inspect.channel.is_empty() || args.inspect.mark_faults.is_some();
+    let wishes = Wishes { inspect, ..Wishes::default() };
     let built = kiln_project::build_with(&engine, None, wishes, &options);
     bar.finish_and_clear();
     let built = built.context("building")?.context("the build was cancelled")?;

@@ -1,5 +1,6 @@
 //! `kiln watch`: bake, then follow every edit.
 
+use std::io::IsTerminal as _;
 use std::process::ExitCode;
 
 use anyhow::Context as _;
@@ -11,9 +12,11 @@ use signal_hook::iterator::Signals;
 
 use crate::args::WatchArgs;
 use crate::out::say;
-use crate::{INPUT_IS_WRONG, place, report};
+use crate::screen::{Block, Screen};
+use crate::{INPUT_IS_WRONG, log, place, report};
 
 pub(crate) fn run(args: &WatchArgs) -> anyhow::Result<ExitCode> {
+    let is_logging = log::start(args.log.as_ref())?;
     let options = DaemonOptions {
         folder: place::project_folder(&args.build.dir)?,
         cache: place::cache_folder()?,
@@ -22,28 +25,55 @@ pub(crate) fn run(args: &WatchArgs) -> anyhow::Result<ExitCode> {
         cache_bytes_max: place::cache_bytes_max()?,
         write_outputs: !args.no_output,
         poll: args.poll,
+        listen: args.listen,
     };
     let daemon = match Daemon::start(&options) {
         Err(DaemonError::Lock(error)) => {
             eprintln!("error: {error}");
             return Ok(ExitCode::from(INPUT_IS_WRONG));
         }
+        Err(error @ DaemonError::Listen { .. }) => return Err(place::WrongInput(error.to_string()).into()),
         daemon => daemon.context("starting to watch")?,
     };
     stop_on_signals(daemon.stop_handle())?;
     // The first edit does not wait for a process to start.
     kiln_worker::warm_up();
     if args.build.json {
-        say!("{}", json!({"event": "listening", "socket": daemon.socket()}));
+        let mut line = json!({"event": "listening", "socket": daemon.socket()});
+        if let Some((address, token_file)) = daemon.tcp() {
+            (line["address"], line["token_file"]) = (json!(address), json!(token_file));
+        }
+        say!("{line}");
         daemon.run(&mut |notice| say!("{}", to_json(&notice)));
     } else {
-        eprintln!("watching {}", options.folder.display());
-        eprintln!("look at it with `kiln preview {}`; Ctrl-C ends\n", args.build.dir.display());
-        let mut screen = Screen::default();
-        daemon.run(&mut |notice| screen.show(&notice));
+        let watching = format!("watching {}", options.folder.display());
+        let mut help = format!("look at it with `kiln preview {}`; Ctrl-C ends", args.build.dir.display());
+        if let Some((address, token_file)) = daemon.tcp() {
+            let token_file = token_file.display();
+            help = format!(
+                "look at it with `kiln preview --connect {address} --token-file {token_file}`; Ctrl-C ends"
+            );
+        }
+        if is_logging || !is_for_a_person() {
+            eprintln!("{watching}\n{help}\n");
+            let mut lines = Lines::default();
+            daemon.run(&mut |notice| lines.show(&notice));
+        } else {
+            let (mut screen, mut block) = (Screen::new(&watching, &help), Block::default());
+            daemon.run(&mut |notice| {
+                screen.take(&notice);
+                block.draw(&screen);
+            });
+        }
         eprintln!("\nended; nothing published was lost");
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Whether somebody looks at a terminal that can be drawn on; others get lines, which can be searched and kept.
+fn is_for_a_person() -> bool {
+    let can_draw = std::env::var_os("TERM").is_some_and(|kind| kind != "dumb");
+    can_draw && std::io::stdout().is_terminal() && std::io::stderr().is_terminal()
 }
 
 pub(crate) fn stop_on_signals(stop: StopHandle) -> anyhow::Result<()> {
@@ -56,14 +86,14 @@ pub(crate) fn stop_on_signals(stop: StopHandle) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Lines for a person who looks up now and then.
+/// Lines for whoever keeps them.
 #[derive(Default)]
-struct Screen {
+struct Lines {
     noticed_unix_ms: f64,
     published_unix_ms: f64,
 }
 
-impl Screen {
+impl Lines {
     fn show(&mut self, notice: &Notice) {
         match notice {
             Notice::Building { files } if files.is_empty() => {}
@@ -148,6 +178,8 @@ fn asked(ask: &Ask) -> String {
             format!("write {}", names.join(", "))
         }
         Ask::AddFiles { paths } => format!("add {}", paths.join(", ")),
+        Ask::BakeAtError { env, error: Some(error) } => format!("bake {env} at an error of {error}"),
+        Ask::BakeAtError { env, error: None } => format!("bake {env} as kiln.toml says"),
         Ask::Unknown => "do something that this Kiln does not know".to_owned(),
     }
 }
