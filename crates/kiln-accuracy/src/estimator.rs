@@ -157,6 +157,7 @@ impl Estimator {
     /// Where a curve is measured, from the cheapest.
     pub fn knobs(self) -> &'static [f64] {
         match self.knob() {
+            Knob::Samples if self == Estimator::Vulkan => &[8.0, 16.0, 32.0, 64.0, 256.0, 1024.0],
             Knob::Error => &[1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5],
             Knob::Samples => &[16.0, 64.0, 256.0, 1024.0, 2048.0, 4096.0],
             Knob::Quality => &[0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0],

@@ -25,6 +25,8 @@ mod tests;
 mod truth;
 mod work;
 
+pub use kiln_bake::BruteForce;
+
 pub use baseline::{Regression, over_limit, regressions};
 pub use chain::{Level, LobeKind, chain, eevee_probe_law, level_count};
 pub use curve::{Bench, Curve, Point, Predicted, sampled_map};

@@ -96,7 +96,7 @@ fn draw(out: &mut String, curve: &Curve, x: &Axis, y: &Axis, label: f64) {
     let class = if curve.estimator == Estimator::Convolution { "own" } else { "other" };
     let _ = write!(
         out,
-        "<g class=\"{class}\"><polyline points=\"{}\" style=\"stroke:{color}\"/>",
+        "<g class=\"{class}\"><polyline fill=\"none\" points=\"{}\" style=\"stroke:{color}\"/>",
         line.join(" ")
     );
     for (point, [x, y]) in curve.points.iter().zip(&places) {
