@@ -26,13 +26,17 @@ fn artefact(environment: &Environment, lobe: crate::LobeKind) -> String {
     format!("env/{}/{map}", environment.name)
 }
 
+/// NaN is above every limit.
+fn is_above(error: f64, limit: f64) -> bool {
+    error > limit || error.is_nan()
+}
+
 /// Chains whose level with the largest RMS error is above `error_max`.
 pub fn over_limit(report: &Report, error_max: f64) -> Vec<Regression> {
     let mut found = Vec::new();
     for environment in &report.environments {
         for chain in &environment.choice.chains {
-            // Written so that NaN is over every limit.
-            if !(chain.worst_rms <= error_max) {
+            if is_above(chain.worst_rms, error_max) {
                 let reason =
                     format!("its error {:.2e} is above --max-error {error_max:.2e}", chain.worst_rms);
                 found.push(Regression { artefact: artefact(environment, chain.lobe), reason });
@@ -55,7 +59,7 @@ pub fn regressions(report: &Report, baseline: &Report) -> Vec<Regression> {
                 found.push(Regression { artefact, reason });
                 continue;
             };
-            if !(after.worst_rms <= before.worst_rms * ERROR_FACTOR) {
+            if is_above(after.worst_rms, before.worst_rms * ERROR_FACTOR) {
                 let reason =
                     format!("its error grew from {:.3e} to {:.3e}", before.worst_rms, after.worst_rms);
                 found.push(Regression { artefact: artefact.clone(), reason });

@@ -237,7 +237,7 @@ fn refined(panorama: &Panorama) -> Panorama {
 /// Means of whole texels until the panorama is at most `width_max` wide.
 fn reduced(panorama: &Panorama, width_max: usize) -> Panorama {
     let mut small = panorama.clone();
-    while small.width() > width_max && small.height() % 2 == 0 {
+    while small.width() > width_max && small.height().is_multiple_of(2) {
         let (width, height) = (small.width() / 2, small.height() / 2);
         let texel = |index: usize| {
             let (x, y) = (2 * (index % width), 2 * (index / width));
@@ -271,15 +271,15 @@ fn split_sum(panorama: &Panorama, cancel: Cancel) -> Result<(f64, f64), Cancelle
             let sine = (1.0 - cos * cos).max(0.0).sqrt();
             let normal = [sine * cos_phi, cos, sine * sin_phi];
             let [tangent, _] = orthonormal_basis(normal);
-            let n_dot_v = [0.2, 0.6, 1.0][index as usize % 3];
-            let across = (1.0 - n_dot_v * n_dot_v as f64).sqrt();
+            let n_dot_v: f64 = [0.2, 0.6, 1.0][index as usize % 3];
+            let across = (1.0 - n_dot_v * n_dot_v).sqrt();
             let view = std::array::from_fn(|i| n_dot_v * normal[i] + across * tangent[i]);
             let split = split_sum_radiance(&small, surface, normal, view);
             let traced = tracer.radiance(surface, normal, view, 256, (seed as u64) << 8 | u64::from(index));
-            for i in 0..3 {
-                off += (split[i] - traced.radiance[i]).powi(2);
-                noise += traced.standard_error[i].powi(2);
-                total += traced.radiance[i].powi(2);
+            for ((split, exact), error) in split.iter().zip(traced.radiance).zip(traced.standard_error) {
+                off += (split - exact).powi(2);
+                noise += error * error;
+                total += exact * exact;
             }
         }
     }

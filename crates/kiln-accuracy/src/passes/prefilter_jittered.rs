@@ -42,6 +42,7 @@ pub fn z_up_basis([x, y, z]: [f64; 3]) -> [[f64; 3]; 2] {
 
 /// A texel's number in [0, 1). The samples hash with a sine, which no two machines compute alike in `f32`; here in `f64`, and
 /// given to the pass as data.
+#[expect(clippy::approx_constant, reason = "the hash types three digits of π")]
 pub fn jitter([x, _, z]: [f64; 3]) -> f64 {
     let turn = (12.9898 * x + 78.233 * z).rem_euclid(3.14);
     (libm::sin(turn) * 43758.5453).rem_euclid(1.0)
