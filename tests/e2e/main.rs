@@ -4,6 +4,7 @@
 
 #![expect(clippy::print_stderr, reason = "skipped tests say so")]
 
+mod accuracy;
 mod bad_input;
 mod bake;
 mod ci;

@@ -17,7 +17,7 @@
 //! steps need.
 //!
 //! Not here: image files and containers (`kiln-image`), when to bake what (`kiln-daemon`), sampled estimators
-//! (`kiln-sample`).
+//! (`kiln-accuracy`).
 
 mod analysis;
 mod bright;

@@ -10,6 +10,7 @@ use kiln_sphere::{
 };
 use rayon::prelude::*;
 use std::f64::consts::PI;
+use std::ops::Range;
 
 /// Smallest α that is told apart from 0.
 pub const ALPHA_MIN: f64 = 1e-4;
@@ -28,6 +29,9 @@ pub struct Prefiltered {
 pub struct Accuracy {
     /// Bound of the RMS error over the sphere and the channels, relative to the RMS (same sense) of the exact map.
     pub rms_bound: f64,
+    /// What truncation is expected to leave, in the same sense: known degrees exactly, and those beyond as if the spectrum went
+    /// on as in its last octave. No bound, but near what is measured where the bound is far above it.
+    pub rms_expected: f64,
     /// Bound of the error in any direction (Euclidean over the channels), relative to the mean radiance (same norm).
     pub sup_bound: f64,
     /// Flux that clamping to the environment's range added or removed, relative to the map's flux.
@@ -104,17 +108,22 @@ fn prefilter(
         Profile::Charlie(kernel) => add_bright(analysis, kernel, face_size, &mut values, cancel)?,
     }
     let clamped_flux = clamp(analysis, face_size, &mut values, cancel)?;
-    let mut largest = 0.0;
+    let (mut largest, mut map_energy) = (0.0_f64, 0.0);
+    let solid_angles = CubeSolidAngles::new(face_size);
     let mut rgb = Bulk::new(Vec::with_capacity(values.len()));
-    for line in values.chunks_exact(face_size * 3) {
+    for (index, line) in values.chunks_exact(face_size * 3).enumerate() {
         cancel.check()?;
-        largest = line.chunks_exact(3).map(norm).fold(largest, f64::max);
+        for (x, texel) in line.chunks_exact(3).enumerate() {
+            let norm = norm(texel);
+            largest = largest.max(norm);
+            map_energy += solid_angles.at(x, index % face_size) * norm * norm;
+        }
         rgb.extend(line.iter().map(|&value| value as f32));
     }
     let cube = Cube { face_size, rgb: rgb.into_inner() };
     Ok(Prefiltered {
         cube,
-        accuracy: truncation.accuracy(largest, clamped_flux, evaluation_error(analysis.error)),
+        accuracy: truncation.accuracy(largest, map_energy, clamped_flux, evaluation_error(analysis.error)),
     })
 }
 
@@ -206,12 +215,27 @@ fn evaluation_error(error: f64) -> f64 {
     interpolated + rule_error(error)
 }
 
+/// Energy a coefficient of the degrees beyond those known: the last octave's, falling on as it does from the octave before.
+fn spectral_density(energies: &[f64]) -> f64 {
+    let octave = |degrees: Range<usize>| {
+        let coefficients: usize = degrees.clone().map(|degree| 2 * degree + 1).sum();
+        energies[degrees].iter().sum::<f64>() / coefficients.max(1) as f64
+    };
+    let half = energies.len() / 2;
+    let (before, last) = (octave(half / 2..half), octave(half..energies.len()));
+    let slope = if last > 0.0 { libm::log2(before / last).clamp(0.0, 4.0) } else { 0.0 };
+    // From the octave's middle to its end, and on against κ² (2l + 1) ~ l⁻⁴, the tail of a lobe with a horizon.
+    last * libm::pow(0.75, slope) * 3.0 / (3.0 + slope)
+}
+
 /// How many degrees a map takes and what the others could have added.
 struct Truncation {
     band_limit: usize,
     bright_texels: usize,
     /// Bound of ∫ |error|² dω.
     energy: f64,
+    /// The same as it is expected.
+    expected: f64,
     /// Bound of |error| in any direction.
     sup: f64,
     /// Lower bound of ∫ |map|² dω.
@@ -231,6 +255,7 @@ impl Truncation {
         let tail = kernel.energy_beyond(last);
         // κ_l² (2l + 1)/4π ≤ tail for each l beyond.
         let mut energy = unknown * tail * 4.0 * PI / (2 * last + 3) as f64;
+        let mut expected = (spectral_density(&energies) * tail * 4.0 * PI).min(energy);
         let mut sup = (unknown * tail).sqrt();
         let allowed = (share * analysis.error).powi(2) * map_energy;
         let mut band_limit = last;
@@ -241,18 +266,29 @@ impl Truncation {
                 break;
             }
             energy = more;
+            expected += kappa * kappa * band;
             sup += kappa.abs() * ((2 * band_limit + 1) as f64 * band / (4.0 * PI)).sqrt();
             band_limit -= 1;
         }
         let bright_texels = analysis.bright.len();
-        Ok(Self { band_limit, bright_texels, energy, sup, map_energy, mean: norm(&analysis.mean()) })
+        Ok(Self {
+            band_limit,
+            bright_texels,
+            energy,
+            expected,
+            sup,
+            map_energy,
+            mean: norm(&analysis.mean()),
+        })
     }
 
-    /// `largest`: norm of the map's brightest texel, which evaluation errors are relative to.
-    fn accuracy(&self, largest: f64, clamped_flux: f64, evaluation_error: f64) -> Accuracy {
+    /// `largest`: norm of the map's brightest texel, which evaluation errors are relative to; `map_energy`: ∫ |map|² dω by its
+    /// texels, which may be far above the lower bound that the other numbers take.
+    fn accuracy(&self, largest: f64, map_energy: f64, clamped_flux: f64, evaluation_error: f64) -> Accuracy {
         let relative = |error: f64, size: f64| if size > 0.0 { error / size } else { 0.0 };
         Accuracy {
             rms_bound: relative(self.energy.sqrt(), self.map_energy.sqrt()) + evaluation_error,
+            rms_expected: relative(self.expected.sqrt(), map_energy.max(self.map_energy).sqrt()),
             sup_bound: relative(self.sup + evaluation_error * largest, self.mean),
             clamped_flux,
             band_limit: self.band_limit,

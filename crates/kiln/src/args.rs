@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, Parser, Subcommand};
 
+mod accuracy;
 #[cfg(feature = "preview")]
 mod inspect;
 #[cfg(feature = "preview")]
@@ -11,6 +12,7 @@ mod render;
 mod shader;
 mod sources;
 
+pub(crate) use accuracy::*;
 #[cfg(feature = "preview")]
 pub(crate) use render::*;
 pub(crate) use shader::*;
@@ -43,6 +45,8 @@ pub(crate) enum Command {
     Env(EnvArgs),
     /// Write a project's environments as an engine wants them
     Export(ExportArgs),
+    /// Measure error, time and size of every way to bake an environment, and say what is worth paying for
+    Accuracy(AccuracyArgs),
     /// Check, reflect and emit shaders, of a project or of none
     #[command(subcommand)]
     Shader(ShaderCommand),

@@ -1,10 +1,10 @@
-//! `cargo xtask bench bake`: accuracy and cost of environment maps, measured by `kiln-bake`'s own bench.
+//! `cargo xtask bench bake` and `bench accuracy`: accuracy and cost of environment maps, measured by the crates' own benches.
 
 use crate::shell::{cargo, step};
 
-/// Runs the bench with what follows `bench bake`; it fails if a figure misses its target.
-pub(crate) fn run(arguments: &[&str]) -> Result<(), String> {
+/// Runs the bench of a name with what follows it; it fails if a figure misses its target.
+pub(crate) fn run(name: &str, arguments: &[&str]) -> Result<(), String> {
     // The whole workspace, as everything else is built: another choice of features would build its own copy of all.
-    let mut bench = cargo(&["bench", "--workspace", "--bench", "bake", "--"]);
-    step("bench bake", bench.args(arguments))
+    let mut bench = cargo(&["bench", "--workspace", "--bench", name, "--"]);
+    step(&format!("bench {name}"), bench.args(arguments))
 }

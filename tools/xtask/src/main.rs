@@ -37,6 +37,7 @@ cargo xtask bench swap [COUNT]    a large chain swapped in while frames are draw
 cargo xtask bench demand          the corpus as one project: baked as its scenes need it and in full; $KILN_CORPUS
 cargo xtask bench bake […]        error and cost of prefiltered maps beside a sampled estimator; accuracy, sampled, model, time, scaling:
                                   one part alone; --huge: memory of a 16384×8192 panorama; panoramas from $KILN_CORPUS
+cargo xtask bench accuracy […]    whether maps keep the error asked for on every panorama of $KILN_CORPUS; --only NAME, --lobes LIST
 cargo xtask faults [COUNT]        kill COUNT processes at random moments and flip COUNT bits (default 1000)
 cargo xtask fuzz [COUNT] [SEED]   decode COUNT damaged copies of each image file of the tests (default 100000)
 cargo xtask bench loop [EDITS]    every stage from a save to its picture, p50, p95 and p99 (default 200)
@@ -73,7 +74,8 @@ fn main() -> ExitCode {
         },
         ["bench", "shaders"] => bench_shaders::run(),
         ["bench", "scenes", arguments @ ..] => bench_scenes::run(arguments),
-        ["bench", "bake", arguments @ ..] => bench_bake::run(arguments),
+        ["bench", "accuracy", arguments @ ..] => bench_bake::run("accuracy", arguments),
+        ["bench", "bake", arguments @ ..] => bench_bake::run("bake", arguments),
         ["faults"] => test::faults("1000"),
         ["faults", count] => test::faults(count),
         ["fuzz"] => test::fuzz(None, None),

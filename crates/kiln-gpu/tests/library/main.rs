@@ -6,6 +6,7 @@ mod bakes;
 mod colour;
 mod complete;
 mod cubes;
+mod estimators;
 mod fragment;
 mod functions;
 mod glsl;

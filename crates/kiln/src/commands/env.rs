@@ -223,7 +223,8 @@ fn choice<T: Copy>(flag: &str, word: &str, choices: &[(&str, T)]) -> anyhow::Res
     })
 }
 
-fn parse_law(text: &str) -> anyhow::Result<RoughnessLaw> {
+/// A law by its name, or a list.
+pub(crate) fn parse_law(text: &str) -> anyhow::Result<RoughnessLaw> {
     let list: Result<Vec<f64>, _> = text.split(',').map(|number| number.trim().parse()).collect();
     let law = match (text, list) {
         ("linear", _) => Ok(RoughnessLaw::Linear),

@@ -1,5 +1,6 @@
 //! One module a command.
 
+pub(crate) mod accuracy;
 pub(crate) mod add;
 pub(crate) mod bake;
 pub(crate) mod cube_picture;

@@ -1,0 +1,2 @@
+mod furnace;
+mod peers;
