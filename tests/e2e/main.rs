@@ -6,6 +6,8 @@
 
 mod bad_input;
 mod bake;
+#[cfg(feature = "preview")]
+mod check;
 mod ci;
 mod control;
 mod corpus;

@@ -7,13 +7,14 @@ use std::process::Command;
 use serde_json::Value;
 
 /// From the bottom to the top: a crate may use those before it.
-const LAYERS: [&str; 17] = [
+const LAYERS: [&str; 18] = [
     "kiln-diagnostic",
     "kiln-sphere",
     "kiln-brdf",
     "kiln-image",
     "kiln-bake",
     "kiln-export",
+    "kiln-check",
     "kiln-gpu",
     "kiln-shader",
     "kiln-worker",
@@ -28,8 +29,16 @@ const LAYERS: [&str; 17] = [
 ];
 
 /// Crates that see bytes and values only.
-const CORE: [&str; 7] =
-    ["kiln-sphere", "kiln-brdf", "kiln-image", "kiln-bake", "kiln-export", "kiln-shader", "kiln-scene"];
+const CORE: [&str; 8] = [
+    "kiln-sphere",
+    "kiln-brdf",
+    "kiln-image",
+    "kiln-bake",
+    "kiln-export",
+    "kiln-check",
+    "kiln-shader",
+    "kiln-scene",
+];
 const IO: [&str; 8] = [
     "std::fs",
     "std::net",

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, Parser, Subcommand};
 
+mod check;
 #[cfg(feature = "preview")]
 mod inspect;
 #[cfg(feature = "preview")]
@@ -11,6 +12,7 @@ mod render;
 mod shader;
 mod sources;
 
+pub(crate) use check::*;
 #[cfg(feature = "preview")]
 pub(crate) use render::*;
 pub(crate) use shader::*;
@@ -43,6 +45,8 @@ pub(crate) enum Command {
     Env(EnvArgs),
     /// Write a project's environments as an engine wants them
     Export(ExportArgs),
+    /// Examine environments, maps and shaders: ranges, seams, energy, a white furnace; for people and for CI
+    Check(HealthArgs),
     /// Check, reflect and emit shaders, of a project or of none
     #[command(subcommand)]
     Shader(ShaderCommand),
