@@ -7,6 +7,8 @@
 mod accuracy;
 mod bad_input;
 mod bake;
+#[cfg(feature = "preview")]
+mod check;
 mod ci;
 mod control;
 mod corpus;

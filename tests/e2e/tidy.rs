@@ -7,13 +7,14 @@ use std::process::Command;
 use serde_json::Value;
 
 /// From the bottom to the top: a crate may use those before it.
-const LAYERS: [&str; 18] = [
+const LAYERS: [&str; 19] = [
     "kiln-diagnostic",
     "kiln-sphere",
     "kiln-brdf",
     "kiln-image",
     "kiln-bake",
     "kiln-export",
+    "kiln-check",
     "kiln-gpu",
     "kiln-accuracy",
     "kiln-shader",
@@ -29,13 +30,14 @@ const LAYERS: [&str; 18] = [
 ];
 
 /// Crates that see bytes and values only.
-const CORE: [&str; 8] = [
+const CORE: [&str; 9] = [
     "kiln-sphere",
     "kiln-brdf",
     "kiln-image",
     "kiln-bake",
     "kiln-export",
     "kiln-accuracy",
+    "kiln-check",
     "kiln-shader",
     "kiln-scene",
 ];

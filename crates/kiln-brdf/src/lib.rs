@@ -2,7 +2,7 @@
 //!
 //! Start at [`dfg`], the split-sum integral of the specular lobe, or at [`d_ggx`] for the lobe itself. [`sheen_albedo`]
 //! is the sheen lobe's, [`albedo_average`] what multiple scattering needs besides, [`fit_error`] says what a
-//! closed-form fit costs. [`sampling`] draws from the lobes.
+//! closed-form fit costs. [`sampling`] draws from the lobes, [`invert`] undoes it.
 //!
 //! Conventions: α = perceptual roughness²; cosines are named for their vectors (`n_dot_v`, `n_dot_l`, `n_dot_h`,
 //! `v_dot_h`) and lie in [0, 1]; V is the visibility G / (4 n·l n·v), so a lobe is D · V · F. All values are `f64`,
@@ -13,6 +13,7 @@
 mod circles;
 mod dfg;
 mod fits;
+pub mod invert;
 mod lobes;
 mod quadrature;
 pub mod sampling;

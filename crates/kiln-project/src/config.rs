@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use kiln_check::{Allowance, Check};
 use kiln_diagnostic::Diagnostic;
 use kiln_scene::{Effect, EffectOverrides, SpecularGlossinessAs};
 use kiln_shader::{Language, Program};
@@ -37,6 +38,8 @@ pub struct Project {
     pub is_without_default_lut: bool,
     /// What the baked files may take together: the budget of `[check]`.
     pub bytes_max: Option<u64>,
+    /// Findings of `kiln check` that are known and accepted: `allow` of `[check]`.
+    pub allowances: Vec<Allowance>,
     /// `[effects]`.
     pub effects: EffectOverrides,
 }
@@ -126,6 +129,7 @@ pub fn parse_project(text: &str) -> (Project, Vec<Diagnostic>) {
         output_dir: "baked".to_owned(),
         is_without_default_lut: false,
         bytes_max: None,
+        allowances: Vec::new(),
         effects: EffectOverrides::default(),
     };
     read_root(&mut document, root.get_ref(), &mut project);
@@ -160,6 +164,7 @@ fn read_root<'a>(document: &mut Document<'a>, root: &DeTable<'a>, project: &mut 
             }),
             "check" => read_single(document, "check", value, |section| {
                 project.bytes_max = section.bytes("max_bytes");
+                project.allowances = read_allowances(section);
             }),
             "effects" => read_single(document, "effects", value, |section| {
                 project.effects = read_effects(section);
@@ -322,6 +327,25 @@ fn read_scene(section: &mut Section, envs: &[String], shaders: &[String]) -> Sce
             .unwrap_or_default(),
         source: read_source(section, "scenes/scene.gltf"),
     }
+}
+
+/// `allow = [{ check = "poles", target = "env/sky", reason = "…" }]`; what is wrong with one leaves that one out.
+fn read_allowances(section: &mut Section) -> Vec<Allowance> {
+    section.tables("allow", |section| {
+        let names = Check::ALL.map(|check| (check.name(), check));
+        if section.place("check") == section.place("") {
+            section.missing("check", "wrap-column");
+        }
+        let check = section.choice("check", &names);
+        let target = section.required_text("target", "env/sky");
+        let place = section.place("reason");
+        let reason = section.required_text("reason", "hidden behind the set");
+        if reason.trim().is_empty() && place != section.place("") {
+            let help = "say why it may stay: the next one to read the report asks".to_owned();
+            section.fail("an allowance needs a reason".to_owned(), place, Some(help));
+        }
+        check.map(|check| Allowance { check, target, reason })
+    })
 }
 
 fn read_effects(section: &mut Section) -> EffectOverrides {

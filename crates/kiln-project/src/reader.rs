@@ -224,6 +224,36 @@ impl<'a, 'd> Section<'a, 'd> {
         chosen
     }
 
+    /// An array of tables, each read by `read` as a section of its own; those with an error are left out.
+    pub(crate) fn tables<T>(
+        &mut self,
+        key: &'static str,
+        mut read: impl FnMut(&mut Section<'a, '_>) -> Option<T>,
+    ) -> Vec<T> {
+        let Some(value) = self.find(key) else { return Vec::new() };
+        let wanted = "an array of tables, as `[{ check = \"…\", … }]`";
+        let DeValue::Array(values) = value.get_ref() else {
+            self.wrong_type(key, wanted, value);
+            return Vec::new();
+        };
+        let mut read_all = Vec::new();
+        for value in values.iter() {
+            let DeValue::Table(table) = value.get_ref() else {
+                self.wrong_type(key, wanted, value);
+                continue;
+            };
+            let name = format!("{}.{key}", self.name);
+            let mut section = Section::new(&mut *self.document, name, value.span(), table);
+            let one = read(&mut section);
+            if section.finish() {
+                read_all.extend(one);
+            } else {
+                self.failed = true;
+            }
+        }
+        read_all
+    }
+
     /// Complains about keys that nothing asked for and, unless one of those may be it misspelt, about required ones
     /// that are absent; returns whether the section may be used.
     pub(crate) fn finish(mut self) -> bool {

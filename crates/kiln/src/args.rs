@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, Parser, Subcommand};
 
 mod accuracy;
+mod check;
 #[cfg(feature = "preview")]
 mod inspect;
 #[cfg(feature = "preview")]
@@ -13,6 +14,7 @@ mod shader;
 mod sources;
 
 pub(crate) use accuracy::*;
+pub(crate) use check::*;
 #[cfg(feature = "preview")]
 pub(crate) use render::*;
 pub(crate) use shader::*;
@@ -47,6 +49,8 @@ pub(crate) enum Command {
     Export(ExportArgs),
     /// Measure error, time and size of every way to bake an environment, and say what is worth paying for
     Accuracy(AccuracyArgs),
+    /// Examine environments, maps and shaders: ranges, seams, energy, a white furnace; for people and for CI
+    Check(HealthArgs),
     /// Check, reflect and emit shaders, of a project or of none
     #[command(subcommand)]
     Shader(ShaderCommand),

@@ -52,6 +52,7 @@ fn main() -> ExitCode {
         args::Command::Env(args) => commands::env::run(&args),
         args::Command::Export(args) => commands::export::run(&args),
         args::Command::Accuracy(args) => commands::accuracy::run(&args),
+        args::Command::Check(args) => commands::check::run(&args),
         args::Command::Shader(command) => commands::shader::run(&command),
         args::Command::Plan(args) => commands::plan::run(&args),
         args::Command::Why(args) => commands::why::run(&args),

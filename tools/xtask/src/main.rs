@@ -14,12 +14,15 @@ use std::process::ExitCode;
 mod bench;
 mod bench_bake;
 mod bench_cache;
+mod bench_check;
 mod bench_demand;
 mod bench_loop;
 mod bench_render;
 mod bench_scenes;
 mod bench_shaders;
 mod corpus;
+mod mutant_list;
+mod mutants;
 mod packages;
 mod shader_files;
 mod shell;
@@ -38,6 +41,9 @@ cargo xtask bench demand          the corpus as one project: baked as its scenes
 cargo xtask bench bake […]        error and cost of prefiltered maps beside a sampled estimator; accuracy, sampled, model, time, scaling:
                                   one part alone; --huge: memory of a 16384×8192 panorama; panoramas from $KILN_CORPUS
 cargo xtask bench accuracy […]    whether maps keep the error asked for on every panorama of $KILN_CORPUS; --only NAME, --lobes LIST
+cargo xtask bench check           `kiln check` on a 2048×1024 panorama: under a second
+cargo xtask mutants [native|FILTER]
+                                  take each guard of shaders away once (native: of Rust code too) and see the tests of hard cases fail
 cargo xtask faults [COUNT]        kill COUNT processes at random moments and flip COUNT bits (default 1000)
 cargo xtask fuzz [COUNT] [SEED]   decode COUNT damaged copies of each image file of the tests (default 100000)
 cargo xtask bench loop [EDITS]    every stage from a save to its picture, p50, p95 and p99 (default 200)
@@ -58,6 +64,7 @@ fn main() -> ExitCode {
         ["test", "--no-install"] => test::run(false),
         ["bench"] => bench::run(20),
         ["bench", "cache"] => bench_cache::run(),
+        ["bench", "check"] => bench_check::run(),
         ["bench", "swap"] => test::swaps("1000"),
         ["bench", "swap", count] => test::swaps(count),
         ["bench", "loop"] => bench_loop::run(200),
@@ -76,6 +83,9 @@ fn main() -> ExitCode {
         ["bench", "scenes", arguments @ ..] => bench_scenes::run(arguments),
         ["bench", "accuracy", arguments @ ..] => bench_bake::run("accuracy", arguments),
         ["bench", "bake", arguments @ ..] => bench_bake::run("bake", arguments),
+        ["mutants"] => mutants::run(false, ""),
+        ["mutants", "native"] => mutants::run(true, ""),
+        ["mutants", filter] => mutants::run(true, filter),
         ["faults"] => test::faults("1000"),
         ["faults", count] => test::faults(count),
         ["fuzz"] => test::fuzz(None, None),

@@ -84,9 +84,9 @@ pub struct Comparison {
 }
 
 /// Worst error of a comparison's results and the arguments of it.
-struct Worst {
-    error: f64,
-    at: [f32; 8],
+pub struct Worst {
+    pub error: f64,
+    pub at: [f32; 8],
 }
 
 impl Comparison {
@@ -105,15 +105,19 @@ impl Comparison {
         worst
     }
 
+    /// The worst errors on the device: against the truth, and against what is wrong.
+    pub fn measure(&self, gpu: &Gpu) -> [Worst; 2] {
+        let results = evaluate(gpu, self.function, self.call, &self.arguments);
+        [self.worst(&results, self.truth), self.worst(&results, self.wrong)]
+    }
+
     /// Compares on the device; says the worst error.
     fn check(&self, gpu: &Gpu) -> Result<(), String> {
-        let results = evaluate(gpu, self.function, self.call, &self.arguments);
-        let worst = self.worst(&results, self.truth);
-        let wrong = self.worst(&results, self.wrong);
+        let [worst, wrong] = self.measure(gpu);
         let line = format!(
             "{:44} {:6} calls  worst {:8.1e}  tolerance {:7.0e}  wrong formula {:8.1e}  at {:?}",
             self.function,
-            results.len(),
+            self.arguments.len(),
             worst.error,
             self.tolerance,
             wrong.error,
@@ -127,7 +131,7 @@ impl Comparison {
 }
 
 /// What the device makes of a WGSL expression of `a` and `b` that uses one function of the library.
-fn evaluate(gpu: &Gpu, function: &str, call: &str, arguments: &[[f32; 8]]) -> Vec<[f32; 4]> {
+pub fn evaluate(gpu: &Gpu, function: &str, call: &str, arguments: &[[f32; 8]]) -> Vec<[f32; 4]> {
     let root = format!(
         "import {function};
             struct Case {{ a: vec4f, b: vec4f }}

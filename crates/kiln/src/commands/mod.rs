@@ -3,6 +3,7 @@
 pub(crate) mod accuracy;
 pub(crate) mod add;
 pub(crate) mod bake;
+pub(crate) mod check;
 pub(crate) mod cube_picture;
 pub(crate) mod demand;
 pub(crate) mod demo;

@@ -73,7 +73,8 @@ pub(super) fn subjects(args: &SubjectArgs) -> anyhow::Result<(Vec<Subject>, Vec<
 /// Ends of the names of shader files.
 const EXTENSIONS: [&str; 8] = ["wgsl", "vert", "frag", "comp", "glsl", "geom", "tesc", "tese"];
 
-fn is_shader(file: &Path) -> bool {
+/// Whether a file's name is that of a shader.
+pub(crate) fn is_shader(file: &Path) -> bool {
     let extension = file.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     EXTENSIONS.contains(&&*extension)
 }
