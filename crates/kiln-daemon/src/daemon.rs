@@ -240,7 +240,7 @@ impl Daemon {
                     match &event {
                         ServerEvent::Asked { client, request } => match &request.ask {
                             Ask::BakeAtError { env, error } => {
-                                self.set_error(*client, request.id, env, *error)
+                                self.set_error(*client, request.id, env, *error);
                             }
                             _ => self.requests.ask(*client, request.clone()),
                         },

@@ -49,7 +49,7 @@ impl Screen {
         match notice {
             Notice::Building { files } if files.is_empty() => self.activity = Some("building all".to_owned()),
             Notice::Building { files } => {
-                self.activity = Some(format!("building: {} changed", shortened(files)))
+                self.activity = Some(format!("building: {} changed", shortened(files)));
             }
             Notice::Unchanged { files } => {
                 self.failure = None;
