@@ -50,7 +50,7 @@ pub use dering::{Deringed, dering};
 pub use encode::{EncodedLevel, TexelFormat, decode_level, encode_level, scale_log2};
 pub use law::{LawError, RoughnessLaw, roughness_of_level};
 pub use measure::{BruteForce, Measured};
-pub use model::{PathTracer, Surface, Traced, split_sum_radiance};
+pub use model::{PathTracer, Surface, Traced, split_sum, split_sum_radiance};
 pub use panorama::panorama_of_cube;
 pub use prefilter::{ALPHA_MIN, Accuracy, Prefiltered, irradiance, sheen_level, specular_level};
 pub use reference::reference_radiance;

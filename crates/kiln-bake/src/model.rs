@@ -63,6 +63,16 @@ pub fn split_sum_radiance(
     normal: [f64; 3],
     view: [f64; 3],
 ) -> [f64; 3] {
+    split_sum(surface, normal, view, |lobe, direction| reference_radiance(panorama, lobe, direction))
+}
+
+/// The same with other lookups: `light` is what an environment convolved with a lobe holds in a direction, of unit length.
+pub fn split_sum(
+    surface: Surface,
+    normal: [f64; 3],
+    view: [f64; 3],
+    light: impl Fn(Lobe, [f64; 3]) -> [f64; 3],
+) -> [f64; 3] {
     let signed = dot(normal, view);
     let Albedos { single, diffuse, .. } = surface.albedos(signed.clamp(0.0, 1.0));
     // The lobe's mean direction leans from the mirror direction towards the normal (Lagarde and de Rousiers 2014, listing 22).
@@ -71,8 +81,8 @@ pub fn split_sum_radiance(
     let towards_mirror = smoothness * (smoothness.sqrt() + alpha);
     let mirror: [f64; 3] = std::array::from_fn(|i| 2.0 * signed * normal[i] - view[i]);
     let direction = normalised(std::array::from_fn(|i| normal[i] + (mirror[i] - normal[i]) * towards_mirror));
-    let reflected = reference_radiance(panorama, Lobe::Ggx { alpha }, direction);
-    let irradiance_over_pi = reference_radiance(panorama, Lobe::Lambert, normal);
+    let reflected = light(Lobe::Ggx { alpha }, direction);
+    let irradiance_over_pi = light(Lobe::Lambert, normal);
     std::array::from_fn(|i| single[i] * reflected[i] + diffuse[i] * irradiance_over_pi[i])
 }
 

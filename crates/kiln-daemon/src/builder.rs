@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use kiln_build::{ActionId, Digest, Engine, Error, Outcome, RunOptions, RunReport, Status};
 use kiln_link::{ActionTime, ProgressReport, Revision, RevisionTable, Server, Work};
-use kiln_project::{Built, Early, Wishes, build_wanted_first, write_outputs};
+use kiln_project::{Built, Choice, Early, Wishes, build_wanted_first, settle, write_outputs};
 
 use crate::watch::Batch;
 
@@ -217,9 +217,25 @@ impl BuilderThread {
         let wants = self.server.wanted();
         let wishes = Wishes { errors: errors.clone(), ..Wishes::among(wants.targets.iter()) };
         let is_wanted = |target: &str| wants.include(target);
+        // Only what the folder says may change has been looked at anew; a choice looks at everything.
+        for choice in self.choices(changed, &options)? {
+            tracing::info!(target: "build", "env/{}: error {} for {} ms", choice.env, choice.locked.error, choice.time_ms);
+        }
         let result = build_wanted_first(&self.engine, changed, wishes, &is_wanted, &early, &options);
         report("");
         result
+    }
+
+    /// Chooses how good environments are that ask for a time, where their sources or kiln.toml may have changed.
+    fn choices(&self, changed: Option<&[String]>, options: &RunOptions) -> Result<Vec<Choice>, Error> {
+        let is_about = |path: &String| {
+            let ending = path.rsplit('.').next().unwrap_or_default();
+            !["wgsl", "glsl", "vert", "frag", "comp", "gltf", "glb", "bin"].contains(&ending)
+        };
+        match changed {
+            Some(files) if !files.iter().any(is_about) => Ok(Vec::new()),
+            _ => settle(&self.engine, options),
+        }
     }
 
     /// A panic outside an action ends neither the thread nor the daemon.

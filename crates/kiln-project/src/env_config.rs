@@ -158,7 +158,7 @@ pub(crate) fn read_env(section: &mut Section) -> EnvConfig {
         section.fail(
             message,
             section.place("time_ms"),
-            Some(format!("take out one; with `time_ms` Kiln chooses the error, and says which")),
+            Some("take out one; with `time_ms` Kiln chooses the error, and says which".to_owned()),
         );
         config.time_ms = None;
     }

@@ -16,7 +16,7 @@ use crate::blob::decode_environment;
 use crate::env_config::{EnvConfig, format_name};
 use crate::environment::{plan_decode, sheen_alpha};
 use crate::lock::{Lock, LockedEnv, digests};
-use crate::plan::{Planner, plan};
+use crate::plan::{Planner, plan, read_project};
 use crate::{EnvDemand, Plan};
 
 /// What was chosen for an environment, and what it should take.
@@ -60,6 +60,10 @@ const SPEED_RUNS: usize = 3;
 /// # Errors
 /// The tool could not do its work, or `kiln.lock` cannot be written.
 pub fn settle(engine: &Engine, options: &RunOptions) -> Result<Vec<Choice>, Error> {
+    engine.begin_plan(None);
+    if !read_project(engine, &mut Vec::new()).envs.values().any(|env| env.time_ms.is_some()) {
+        return Ok(Vec::new());
+    }
     let plan = plan(engine, None)?;
     if plan.open.is_empty() {
         return Ok(Vec::new());

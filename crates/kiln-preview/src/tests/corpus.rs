@@ -5,7 +5,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use image::RgbaImage;
-use kiln_bake::{AnalysisRequest, Cancel, TexelFormat, encode_level, scale_log2};
+use kiln_accuracy::Source;
+use kiln_bake::{AnalysisRequest, Cancel, Lobe, TexelFormat, encode_level, scale_log2};
 use kiln_image::{Cube, Limits, Panorama};
 use serde_json::json;
 
@@ -38,7 +39,12 @@ fn bake(build: &mut Build, name: &str, path: &Path) {
 }
 
 /// The same for a panorama; `size` and `levels` of the chain.
-pub(super) fn bake_panorama(build: &mut Build, name: &str, panorama: &Panorama, [size, levels]: [usize; 2]) {
+pub(super) fn bake_panorama(
+    build: &mut Build,
+    name: &str,
+    panorama: &Panorama,
+    [size, levels]: [usize; 2],
+) -> Maps {
     let request = AnalysisRequest {
         alpha_min: (1.0 / (levels - 1) as f64).powi(2),
         sheen_alpha_min: None,
@@ -55,8 +61,28 @@ pub(super) fn bake_panorama(build: &mut Build, name: &str, panorama: &Panorama, 
     let specular: Vec<Cube> = std::iter::once(mirror).chain((1..levels).map(level)).collect();
     add_cube(build, &format!("env/{name}/specular"), &specular);
     let irradiance = kiln_bake::irradiance(&analysis, 64, Cancel::NEVER).expect(WANTED);
-    add_cube(build, &format!("env/{name}/irradiance"), &[irradiance.cube]);
+    let irradiance = [irradiance.cube];
+    add_cube(build, &format!("env/{name}/irradiance"), &irradiance);
     add_cube(build, &format!("env/{name}/skybox"), &skybox(256));
+    let source = |levels: &[Cube]| Source::of_levels(levels, Cancel::NEVER).expect(WANTED);
+    Maps { specular: source(&specular), irradiance: source(&irradiance), levels }
+}
+
+/// What was baked, to be looked up in `f64`.
+pub(super) struct Maps {
+    specular: Source,
+    irradiance: Source,
+    levels: usize,
+}
+
+impl Maps {
+    /// As shaders look it up: bilinear across faces' edges, linear between levels.
+    pub(super) fn light(&self, lobe: Lobe, direction: [f64; 3]) -> [f64; 3] {
+        match lobe {
+            Lobe::Ggx { alpha } => self.specular.sample(direction, alpha.sqrt() * (self.levels - 1) as f64),
+            _ => self.irradiance.sample(direction, 0.0),
+        }
+    }
 }
 
 fn add_cube(build: &mut Build, name: &str, levels: &[Cube]) {
