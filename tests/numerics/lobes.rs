@@ -312,7 +312,6 @@ fn anisotropic_distribution_does_not_overflow() {
 
 #[test]
 fn schlick_of_a_cosine_above_one_is_f0() {
-    assert!(COSINES[13] > 1.0, "what rounding makes of a unit vector's dot product");
     let fresnel = Comparison {
         function: "lib::brdf::f_schlick",
         call: "vec4f(f_schlick(vec3f(a.y), 1.0, a.x), 0.0)",

@@ -127,10 +127,7 @@ struct Brightest {
 }
 
 impl Sums {
-    fn of<T: Texels>(texels: &T, scale_log2: i32, cancel: Cancel) -> Result<Sums, Cancelled>
-    where
-        T: Sync,
-    {
+    fn of(texels: &impl Texels, scale_log2: i32, cancel: Cancel) -> Result<Sums, Cancelled> {
         let shape = texels.shape();
         let (weights, row) = (Weights::new(shape), row_texels(shape));
         let scale = libm::exp2(f64::from(-scale_log2));
