@@ -33,7 +33,7 @@ fn plain_copy(bytes: &[u8]) -> f64 {
     let begun = Instant::now();
     std::thread::scope(|scope| {
         scope.spawn(move || {
-            bytes.chunks(crate::wire::CHUNK_BYTES).for_each(|chunk| out.write_all(chunk).unwrap())
+            bytes.chunks(crate::wire::CHUNK_BYTES).for_each(|chunk| out.write_all(chunk).unwrap());
         });
         into.read_exact(&mut room).unwrap();
     });
