@@ -32,6 +32,7 @@ mod render;
 mod requests;
 mod shader_commands;
 mod shaders;
+mod soak;
 mod storms;
 mod tidy;
 #[cfg(feature = "preview")]

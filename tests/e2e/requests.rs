@@ -21,13 +21,13 @@ fn set_writes_a_value_with_a_daemon_and_without() {
     let set = project.run(&["set", "tonemap.tone_mapper=agx", "--dir", "DIR"]);
     assert_done(&set);
     assert_eq!(text(&set.stdout), format!("wrote {TONEMAP}\n"));
-    assert_eq!(project.read(TONEMAP), before.replace("@choice(0, ", "@choice(1, "));
+    assert_eq!(project.read(TONEMAP), before.replace("0u; // @choice(0, ", "1u; // @choice(1, "));
     let watch = project.watch();
     watch.published();
     assert_done(&project.run(&["set", "tonemap.tone_mapper=reinhard", "--dir", "DIR"]));
     assert_eq!(watch.wait_for("asked")["request"]["ask"], "write_parameters");
     assert_eq!(watch.published()["work"]["changed_files"][0], TONEMAP);
-    assert_eq!(project.read(TONEMAP), before.replace("@choice(0, ", "@choice(3, "));
+    assert_eq!(project.read(TONEMAP), before.replace("0u; // @choice(0, ", "3u; // @choice(3, "));
     for (value, reason) in [
         ("tonemap.tone_mapper=pretty", "names no parameter and value"),
         ("tonemap.tone_mapper=9", "the number of one of neutral, agx, aces, reinhard, none"),
@@ -38,7 +38,7 @@ fn set_writes_a_value_with_a_daemon_and_without() {
         assert_eq!(refused.status.code(), Some(1), "{value}");
         assert!(text(&refused.stderr).contains(reason), "{value}: {}", text(&refused.stderr));
     }
-    assert_eq!(project.read(TONEMAP), before.replace("@choice(0, ", "@choice(3, "));
+    assert_eq!(project.read(TONEMAP), before.replace("0u; // @choice(0, ", "3u; // @choice(3, "));
 }
 
 #[test]

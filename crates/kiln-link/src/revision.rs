@@ -18,8 +18,8 @@ pub struct RevisionTable {
     pub diagnostics: Vec<Diagnostic>,
     /// What was done to make this revision from the one before.
     pub work: Work,
-    /// Targets whose new content is still being made, while what clients want is here already: those that were published before
-    /// are as they were, new ones are missing. The next revision follows.
+    /// Targets whose new content is still being made or measured, while what clients want is here already: those that were published
+    /// before are as they were or as they will be but for what is measured, new ones are missing. The next revision follows.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub building: Vec<String>,
 }

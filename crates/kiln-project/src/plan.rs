@@ -81,6 +81,11 @@ impl PartSpec {
         }
     }
 
+    /// Whether it has bytes, and is not what was found out about them.
+    fn is_content(&self) -> bool {
+        !matches!(self, PartSpec::Facts(_))
+    }
+
     /// The parts, if the action made them.
     fn resolve(&self, report: &RunReport) -> Option<Vec<Part>> {
         let outcome = report.outcome(self.action());
@@ -326,7 +331,7 @@ impl Plan {
 
     /// Joins what the actions made into targets; without those that could not be made.
     pub(crate) fn resolve_fresh(&self, report: &RunReport) -> (Targets, Vec<Diagnostic>) {
-        let made = |spec: &TargetSpec| Some((spec.name.clone(), resolve_target(spec, report)?));
+        let made = |spec: &TargetSpec| Some((spec.name.clone(), resolve_target(spec, report, |_| true)?));
         (self.targets.iter().filter_map(made).collect(), self.said(report))
     }
 
@@ -350,11 +355,13 @@ impl Plan {
         let goes_first =
             |target: &&TargetSpec| ["shader", "lut"].contains(&target.kind) || is_wanted(&target.name);
         let first = self.targets.iter().filter(goes_first).flat_map(|target| &target.parts);
-        let first: Vec<ActionId> = first.map(PartSpec::action).collect();
+        // A picture need not wait until the error of its maps is measured.
+        let first: Vec<ActionId> = first.filter(|part| part.is_content()).map(PartSpec::action).collect();
         self.graph.hurry(&first);
     }
 
     /// Joins what the actions made so far into targets; those that wait for others stay as they were published, and are named.
+    /// So are those of which all is there but what measures it.
     pub(crate) fn resolve_early(
         &self,
         engine: &Engine,
@@ -366,7 +373,11 @@ impl Plan {
             let waits = |part: &PartSpec| report.outcome(part.action()).status == Status::NotRun;
             if spec.parts.iter().any(waits) {
                 building.push(spec.name.clone());
-            } else if let Some(target) = resolve_target(spec, report) {
+            }
+            if spec.parts.iter().filter(|part| part.is_content()).any(waits) {
+                continue;
+            }
+            if let Some(target) = resolve_target(spec, report, |part| part.is_content() || !waits(part)) {
                 targets.insert(spec.name.clone(), target);
             } else if let Some(target) = engine.last_good(&spec.name) {
                 targets.insert(spec.name.clone(), target.into_stale());
@@ -387,7 +398,7 @@ impl Plan {
             targets.extend(published.keys().filter(is_asked_for).filter_map(last_good));
         }
         for spec in &self.targets {
-            if let Some(target) = resolve_target(spec, report) {
+            if let Some(target) = resolve_target(spec, report, |_| true) {
                 targets.insert(spec.name.clone(), target);
                 continue;
             }
@@ -404,8 +415,14 @@ impl Plan {
     }
 }
 
-fn resolve_target(spec: &TargetSpec, report: &RunReport) -> Option<Target> {
-    let parts: Vec<Vec<Part>> = spec.parts.iter().map(|part| part.resolve(report)).collect::<Option<_>>()?;
+/// `is_read` tells parts that the target must have.
+fn resolve_target(
+    spec: &TargetSpec,
+    report: &RunReport,
+    is_read: impl Fn(&PartSpec) -> bool,
+) -> Option<Target> {
+    let parts = spec.parts.iter().filter(|part| is_read(part)).map(|part| part.resolve(report));
+    let parts: Vec<Vec<Part>> = parts.collect::<Option<_>>()?;
     let parts = parts.into_iter().flatten().collect();
     let meta = gather_meta(spec, report);
     Some(Target { kind: spec.kind.to_owned(), state: TargetState::Fresh, meta, parts })
@@ -415,8 +432,8 @@ fn resolve_target(spec: &TargetSpec, report: &RunReport) -> Option<Target> {
 /// the facts of the plan, which win: an action may serve two targets.
 fn gather_meta(spec: &TargetSpec, report: &RunReport) -> Value {
     let mut meta = Map::new();
-    let is_content = |part: &&PartSpec| !matches!(part, PartSpec::Facts(_));
-    let mut actions: Vec<ActionId> = spec.parts.iter().filter(is_content).map(PartSpec::action).collect();
+    let content = spec.parts.iter().filter(|part| part.is_content());
+    let mut actions: Vec<ActionId> = content.map(PartSpec::action).collect();
     actions.dedup();
     for part in &spec.parts {
         if let PartSpec::Facts(action) = part

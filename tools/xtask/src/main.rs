@@ -52,6 +52,8 @@ cargo xtask fuzz shaders [COUNT] [SEED]
                                   compile COUNT damaged, COUNT random WGSL and COUNT random GLSL shaders in the worker (default 10000)
 cargo xtask fuzz wire [COUNT] [SEED]
                                   damage COUNT talks of a daemon and COUNT of a client, some over real sockets (default 100000)
+cargo xtask soak [EDITS] [SEED]   edits, typing mistakes, kills and reconnections in random order beside a model of what must be published
+                                  (default 20000)
 cargo xtask corpus [OUT]          bake and render the files of $KILN_CORPUS into OUT (default target/corpus)
 cargo xtask size                  build with and without the preview and compare time and size
 ";
@@ -95,6 +97,9 @@ fn main() -> ExitCode {
         ["fuzz", "wire"] => test::fuzz_wire(None, None),
         ["fuzz", "wire", count] => test::fuzz_wire(Some(count), None),
         ["fuzz", "wire", count, seed] => test::fuzz_wire(Some(count), Some(seed)),
+        ["soak"] => test::soak("20000", None),
+        ["soak", count] => test::soak(count, None),
+        ["soak", count, seed] => test::soak(count, Some(seed)),
         ["fuzz", count] => test::fuzz(Some(count), None),
         ["fuzz", count, seed] => test::fuzz(Some(count), Some(seed)),
         ["bench", edits] => match edits.parse() {

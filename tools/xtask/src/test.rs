@@ -92,6 +92,18 @@ pub(crate) fn fuzz_wire(count: Option<&str>, seed: Option<&str>) -> Result<(), S
     step("fuzz wire", &mut tests)
 }
 
+/// `count` deeds of a restless user, and what must be published after each.
+pub(crate) fn soak(count: &str, seed: Option<&str>) -> Result<(), String> {
+    let mut tests =
+        cargo(&["test", "--release", "-p", "kiln", "--test", "e2e", "--", "soak::no_edit", "--nocapture"]);
+    tests.env("KILN_SOAK_EDITS", number(count)?);
+    match seed {
+        Some(seed) => tests.env("KILN_SOAK_SEED", number(seed)?),
+        None => tests.env_remove("KILN_SOAK_SEED"),
+    };
+    step("soak", &mut tests)
+}
+
 /// How fast a revision of 64 MiB crosses the socket, beside a plain copy and the hash alone.
 pub(crate) fn wire() -> Result<(), String> {
     let arguments =
