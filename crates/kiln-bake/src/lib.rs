@@ -16,7 +16,7 @@
 //! Every step takes a [`Cancel`] last: soon after it is set the step returns [`Cancelled`]. [`memory`] says what the
 //! steps need.
 //!
-//! Not here: image files and containers (`kiln-image`), when to bake what (`kiln-daemon`), sampled estimators
+//! Not here: image files and containers (`kiln-image`), when to bake what (`kiln-project`), sampled estimators
 //! (`kiln-accuracy`).
 
 mod analysis;
